@@ -419,12 +419,16 @@ class SurfaceFriction(_Model):
     """Downstream side."""
 
 
+def _or_one_friction(schema: dict[str, Any]) -> None:
+    schema["anyOf"] = [{"$ref": schema.pop("$ref")}, {"type": "number", "minimum": 0, "maximum": 10}]
+
+
 class Barrier(_Model):
     """A rigid, impermeable barrier on the ground."""
 
     shape: Annotated[Trapezoid | Wall, Field(discriminator="kind")]
     motion: Annotated[Fixed | Sliding | Prescribed, Field(discriminator="kind")]
-    friction: SurfaceFriction
+    friction: Annotated[SurfaceFriction, Field(json_schema_extra=_or_one_friction)]
     """Friction coefficient tan δ against the flow; one number holds for all surfaces."""
 
     @field_validator("friction", mode="before")
@@ -557,6 +561,12 @@ class Scenario(_Model):
         except ValidationError as error:
             raise ScenarioError(sentences(error, cls), source_name) from None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_schema_pointer(cls, data: Any) -> Any:
+        # "$schema" tells an editor where the JSON Schema lies; it says nothing about the scene.
+        return {key: value for key, value in data.items() if key != "$schema"} if isinstance(data, dict) else data
+
     def resolved(self) -> dict[str, Any]:
         """The scenario as a dict of plain JSON values with every default filled in; loads to an equal Scenario."""
         return self.model_dump(mode="json")
@@ -659,4 +669,5 @@ class Scenario(_Model):
 def json_schema() -> str:
     """The scenario format as JSON Schema (draft 2020-12), indented text."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
+    schema["properties"] = {"$schema": {"type": "string"}, **schema["properties"]}
     return json.dumps(schema, indent=2, ensure_ascii=False)
