@@ -1,0 +1,183 @@
+"""Builds the archives: pythonfmu packs a unit, and what a plain archive lacks is put right here.
+
+A plain archive of pythonfmu differs at every build, has no documentation, and its modules have names that another
+archive in the same host may also use, which then runs the wrong code in silence. Here the code goes into a package
+whose name carries the version and a stamp of its content, pythonfmu's own modules with it; documentation, licence, icon
+and reference results are added; and the archive is written anew with fixed order, dates and compression.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from fmu import documentation
+from fmu.units.interface import Interface
+
+PROJECT = "warp-mpm-impact"
+_HERE = Path(__file__).parent
+_UNITS = _HERE / "units"
+_ROOT = _HERE.parent
+_COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
+_ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
+
+_SCRIPT = """\
+from {package}.{unit.module} import {unit.slave}
+from {package}.slave import keep_alive
+
+# The wrapper runs this file at every instantiation and then releases its namespace, which it does not own.
+keep_alive(globals())
+
+
+class {unit.name}({unit.slave}):
+    version = {version}
+"""
+
+
+class BuildError(Exception):
+    """An archive that could not be built; the message is one sentence for the user."""
+
+
+@dataclass(frozen=True)
+class PythonUnit:
+    """A unit that pythonfmu packs: its module in ``fmu/units``, its slave class, and other modules that it needs."""
+
+    name: str
+    module: str
+    slave: str
+    other_modules: tuple[str, ...] = ()
+    needs_impact: bool = False
+
+    @property
+    def interface(self) -> Interface:
+        import importlib
+
+        return importlib.import_module(f"fmu.units.{self.module}").INTERFACE
+
+
+PYTHON_UNITS = (
+    PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", needs_impact=True),
+    PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
+    PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+)
+
+
+def project_version() -> str:
+    """Version of the project, from its installation or, in a bare checkout, from ``pyproject.toml``."""
+    try:
+        return metadata.version(PROJECT)
+    except metadata.PackageNotFoundError:
+        import tomllib
+
+        return tomllib.loads((_ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+
+
+def build_python_unit(
+    unit: PythonUnit, folder: Path, *, version: str | None = None, resources: Mapping[str, bytes] | None = None
+) -> Path:
+    """Build ``folder/<name>.fmu``.
+
+    Parameters
+    ----------
+    unit: which one.
+    folder: created if missing; an archive of the same name in it is replaced.
+    version: instead of the project's version.
+    resources: further files for the archive's ``resources`` folder, by name.
+
+    Raises
+    ------
+    BuildError: pythonfmu refused; nothing is left in ``folder``.
+    """
+    version = version or project_version()
+    sources = _shipped_sources(unit)
+    content = hashlib.sha256(
+        json.dumps([metadata.version("pythonfmu"), sorted(sources.items())]).encode()
+    ).hexdigest()[:8]
+    stamp = re.sub(r"\W", "_", f"{unit.module}_{version}_{content}")
+    package, script = f"_{stamp}", stamp
+    with tempfile.TemporaryDirectory(prefix="fmu_build_") as temporary:
+        stage = Path(temporary)
+        (stage / package).mkdir()
+        for name, text in sources.items():
+            (stage / package / name).write_text(text, encoding="utf-8")
+        script_text = _SCRIPT.format(package=package, unit=unit, version=repr(f"{version}+{content}"))
+        (stage / f"{script}.py").write_text(script_text, encoding="utf-8")
+        _run_pythonfmu(stage, script, package)
+        with zipfile.ZipFile(stage / f"{unit.name}.fmu") as plain:
+            entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
+        entries = _own_pythonfmu(entries, package)
+        entries |= {f"resources/{name}": data for name, data in (resources or {}).items()}
+        entries |= documentation.entries(unit.interface, version)
+        return write_archive(folder / f"{unit.name}.fmu", entries)
+
+
+def write_archive(path: Path, entries: Mapping[str, bytes]) -> Path:
+    """Write a zip file whose bytes depend on the entries alone; an earlier file is replaced only when all is well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".part")
+    try:
+        with zipfile.ZipFile(partial, "w") as archive:
+            for name in sorted(entries, key=lambda name: (name != "modelDescription.xml", name)):
+                info = zipfile.ZipInfo(name, _ARCHIVE_DATE)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.create_system = 3  # Unix, wherever it is built
+                info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+                archive.writestr(info, entries[name])
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def _shipped_sources(unit: PythonUnit) -> dict[str, str]:
+    names = (*_COMMON_MODULES, f"{unit.module}.py", *unit.other_modules)
+    sources = {name: (_UNITS / name).read_text(encoding="utf-8") for name in names}
+    if unit.needs_impact:
+        main = f"{unit.module}.py"
+        if "from analytic.impact import" not in sources[main]:
+            raise BuildError(f"{main} does not import analytic.impact, although {unit.name} is said to need it.")
+        sources[main] = sources[main].replace("from analytic.impact import", "from .impact import")
+        sources["impact.py"] = (_ROOT / "analytic" / "impact.py").read_text(encoding="utf-8")
+    return sources
+
+
+def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
+    # A process of its own: pythonfmu imports the script by name, which would stay in this process for the next build.
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", f"{script}.py", "-d", ".", package]
+    result = subprocess.run(
+        [*command, "--handle-state", "--serialize-state"], cwd=stage, capture_output=True, text=True, check=False
+    )
+    if result.returncode:
+        last = (result.stderr.strip().splitlines() or [f"exit code {result.returncode}"])[-1]
+        raise BuildError(f"pythonfmu could not build {package}: {last}")
+
+
+def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, bytes]:
+    """Move pythonfmu's modules into the stamped package: another archive in the host may bring another version."""
+    plain, own = "resources/pythonfmu/", f"resources/{package}/pythonfmu/"
+    moved = {own + name.removeprefix(plain) if name.startswith(plain) else name: data for name, data in entries.items()}
+    slave = f"resources/{package}/slave.py"
+    text = moved[slave].decode()
+    if "from pythonfmu." not in text:
+        raise BuildError("slave.py does not import pythonfmu in the expected way.")
+    moved[slave] = text.replace("from pythonfmu.", "from .pythonfmu.").encode()
+    # The package's front door imports the builder, which a host does not need.
+    moved[f"{own}__init__.py"] = b""
+    for tool in ("__main__", "builder", "csvbuilder", "deploy"):
+        moved.pop(f"{own}{tool}.py", None)
+    return moved
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder that an archive was unpacked to."""
+    shutil.rmtree(folder, ignore_errors=True)
