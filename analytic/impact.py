@@ -71,7 +71,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A stretch of time in which the force is linear and both motions are cubics."""
+    """A stretch of time, counted from arrival, in which the force is linear and both motions are cubics."""
 
     name: str
     start: float
@@ -98,6 +98,8 @@ class Impact:
     geometry_change: lambda = s1max / L_1,0 [-], in (0, 1]. Give either this or ``s1max``.
     s1max: largest geometry change length of the flow [m], in (0, L_1,0].
     rise_ratio: tau = T1 / T2 [-], in (0, 1].
+    vertical_load_ratio: kappa [-] >= 0, vertical load of the flow on the barrier over its horizontal force. The paper
+        leaves it out (0); it adds kappa F tan(delta_b) to the friction while the force acts. kappa tan(delta_b) < 1.
     variant: one of ``VARIANTS``.
     arrival_time: time at which the front reaches the barrier [s] >= 0; all times below count from the same zero.
     gravity: g [m/s^2] > 0.
@@ -117,6 +119,7 @@ class Impact:
     geometry_change: float | None = None
     s1max: float | None = None
     rise_ratio: float
+    vertical_load_ratio: float = 0.0
     variant: str = VARIANTS[0]
     arrival_time: float = 0.0
     gravity: float = STANDARD_GRAVITY
@@ -126,7 +129,7 @@ class Impact:
     impulse: float = field(init=False, repr=False, compare=False)
     """J = integral of F dt over the whole impact [N s/m]."""
     phases: tuple[Phase, ...] = field(init=False, repr=False, compare=False)
-    """The phases in order of time; each lasts until the next begins."""
+    """The phases in order of time, which counts from arrival; each lasts until the next begins."""
     _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -164,7 +167,7 @@ class Impact:
 
     @property
     def friction(self) -> float:
-        """R = m2 g tan(delta_b) [N/m], the force that the base can resist; infinite where the barrier is fixed."""
+        """R = m2 g tan(delta_b) [N/m], what the base resists by the barrier's weight; infinite where it is fixed."""
         if self.barrier_mass is None or self.fixed:
             return math.inf
         return self.barrier_mass * self.friction_deceleration
@@ -173,6 +176,11 @@ class Impact:
     def friction_deceleration(self) -> float:
         """g tan(delta_b) [m/s^2], Eq. (A30)."""
         return self.gravity * (self.base_friction or 0.0)
+
+    @property
+    def threshold_force(self) -> float:
+        """R / (1 - kappa tan(delta_b)) [N/m], the force beyond which the barrier moves; infinite where it is fixed."""
+        return self.friction / self._driving_share
 
     @property
     def duration(self) -> float:
@@ -209,14 +217,14 @@ class Impact:
 
     @property
     def barrier_velocity_max(self) -> float:
-        """Largest velocity of the barrier [m/s]; v_CM (1 - R / F_peak)^2 in ``stick_slip`` with v_2,0 = 0."""
+        """Largest velocity of the barrier [m/s]; v_CM (1 - R / F_peak)^2 in ``stick_slip`` with v_2,0 = kappa = 0."""
         # The velocity is extreme where F = R, and a phase begins there.
         return max(phase.barrier.velocity for phase in self.phases)
 
     @property
     def barrier_velocity_at_impact_end(self) -> float:
         """Velocity of the barrier at T2 [m/s], at the end of the impact stage."""
-        return self.barrier_velocity(self.impact_end_time)
+        return self._phase(self.duration).barrier.velocity_at(self.duration)
 
     @property
     def stop_time(self) -> float:
@@ -224,7 +232,8 @@ class Impact:
         moving = [i for i, phase in enumerate(self.phases) if _moves(phase.barrier)]
         if not moving or moving[-1] == 0:
             return self.arrival_time
-        return self.phases[moving[-1] + 1].start if moving[-1] + 1 < len(self.phases) else math.inf
+        stop = moving[-1] + 1
+        return self.arrival_time + self.phases[stop].start if stop < len(self.phases) else math.inf
 
     @property
     def barrier_displacement_final(self) -> float:
@@ -240,26 +249,30 @@ class Impact:
 
     def phase(self, t: float) -> str:
         """Name of the phase at the time ``t`` [s]; at the instant between two phases, the earlier one."""
-        return self._phase(t).name
+        return self._phase(t - self.arrival_time).name
 
     def force(self, t: float) -> float:
         """Horizontal impact force F [N/m] at the time ``t`` [s], Eqs. (6) and (A35)."""
-        phase = self._phase(t)
-        return phase.force + (t - phase.start) * phase.force_rate
+        since = t - self.arrival_time
+        phase = self._phase(since)
+        return phase.force + (since - phase.start) * phase.force_rate
 
     def impulse_until(self, t: float) -> float:
         """Integral of F from arrival to the time ``t`` [N s/m]."""
-        phase = self._phase(t)
-        u = t - phase.start
+        since = t - self.arrival_time
+        phase = self._phase(since)
+        u = since - phase.start
         return phase.impulse + u * (phase.force + u * phase.force_rate / 2)
 
     def flow_velocity(self, t: float) -> float:
         """Velocity v1 [m/s] of the flow's centre of mass at the time ``t`` [s]."""
-        return self._phase(t).flow.velocity_at(t)
+        since = t - self.arrival_time
+        return self._phase(since).flow.velocity_at(since)
 
     def flow_displacement(self, t: float) -> float:
         """Travel [m] of the flow's centre of mass since arrival (negative before) at the time ``t`` [s]."""
-        return self._phase(t).flow.displacement_at(t)
+        since = t - self.arrival_time
+        return self._phase(since).flow.displacement_at(since)
 
     def flow_kinetic_energy(self, t: float) -> float:
         """E_k1 = m1 v1^2 / 2 [J/m] at the time ``t`` [s], Eq. (11)."""
@@ -267,11 +280,13 @@ class Impact:
 
     def barrier_velocity(self, t: float) -> float:
         """Velocity v2 [m/s] of the barrier at the time ``t`` [s]."""
-        return self._phase(t).barrier.velocity_at(t)
+        since = t - self.arrival_time
+        return self._phase(since).barrier.velocity_at(since)
 
     def barrier_displacement(self, t: float) -> float:
         """Displacement of the barrier since arrival [m] at the time ``t`` [s]."""
-        return self._phase(t).barrier.displacement_at(t)
+        since = t - self.arrival_time
+        return self._phase(since).barrier.displacement_at(since)
 
     def barrier_kinetic_energy(self, t: float) -> float:
         """E_k2 = m2 v2^2 / 2 [J/m] at the time ``t`` [s], Eq. (13); nil where the barrier is fixed."""
@@ -290,9 +305,23 @@ class Impact:
 
     # --- construction ------------------------------------------------------------------------------------------------
 
-    def _phase(self, t: float) -> Phase:
+    def _phase(self, since: float) -> Phase:
+        """Phase at the time ``since`` arrival [s]."""
         # bisect_left: an instant between two phases belongs to the earlier, so T2 is the end of the impact stage.
-        return self.phases[max(bisect_left(self._starts, t) - 1, 0)]
+        return self.phases[max(bisect_left(self._starts, since) - 1, 0)]
+
+    @property
+    def _driving_share(self) -> float:
+        """1 - kappa tan(delta_b): what is left of the force when the friction that it brings along is taken off."""
+        return 1.0 if self.fixed else 1 - self.vertical_load_ratio * (self.base_friction or 0.0)
+
+    @property
+    def _driven_mass(self) -> float:
+        """Mass [kg/m] that the whole force would move, against the threshold force, as the driving share moves m2.
+
+        (F (1 - kappa tan) - R) / m2 = (F - R / (1 - kappa tan)) / (m2 / (1 - kappa tan)).
+        """
+        return math.inf if self.barrier_mass is None or self.fixed else self.barrier_mass / self._driving_share
 
     def _barrier_energy(self, velocity: float) -> float:
         return 0.0 if self.barrier_mass is None or self.fixed else self.barrier_mass * velocity**2 / 2
@@ -302,27 +331,27 @@ class Impact:
         stopping = self.flow_mass * self.speed
         if self.barrier_mass is None or self.fixed:
             return stopping
-        T2, R, deceleration = self.duration, self.friction, self.friction_deceleration
+        T2, R, deceleration = self.duration, self.threshold_force, self.friction_deceleration
+        reduced_mass = self.flow_mass / (1 + self.flow_mass / self._driven_mass)
         if self._barrier_at_impact_end(stopping).velocity <= 0:
             return stopping  # both are at rest at T2: the common velocity is nil
-        never_at_rest = self.reduced_mass * (self.approach_speed + deceleration * T2)
+        never_at_rest = reduced_mass * (self.approach_speed + deceleration * T2)
         ratio = R * T2 / (2 * never_at_rest)
         if ratio >= 1 or self.barrier_initial_velocity > deceleration * ratio * self.rise_ratio * T2 / 2:
             return never_at_rest
-        A = self.reduced_mass * (self.speed + deceleration * T2)
-        return (A + math.sqrt(A**2 - self.reduced_mass * deceleration * self.rise_ratio * R * T2**2)) / 2
+        A = reduced_mass * (self.speed + deceleration * T2)
+        return (A + math.sqrt(A**2 - reduced_mass * deceleration * self.rise_ratio * R * T2**2)) / 2
 
     def _barrier_at_impact_end(self, impulse: float) -> Motion:
         motion = Motion(0.0, 0.0, self.barrier_initial_velocity)
-        pieces = [motion]
         for start, end, force, rate in self._force_pieces(impulse):
-            pieces = list(coulomb_motion(start, end, force, rate, motion, self.barrier_mass or math.inf, self.friction))
-            motion = pieces[-1].shifted(end)
+            pieces = coulomb_motion(start, end, force, rate, motion, self._driven_mass, self.threshold_force)
+            motion = list(pieces)[-1].shifted(end)
         return motion
 
     def _force_pieces(self, impulse: float) -> list[tuple[float, float, float, float]]:
-        """Start, end, force at the start and its rate of each piece in which F - R keeps its sign; from arrival on."""
-        T2, R = self.duration, self.friction
+        """Start, end, force at the start and its rate of each piece in which F stays above or below the threshold."""
+        T2, R = self.duration, self.threshold_force
         T1 = self.rise_ratio * T2
         peak = 2 * impulse / T2
         rise, fall = peak / T1, -peak / (T2 - T1) if T1 < T2 else 0.0
@@ -333,17 +362,15 @@ class Impact:
         return [(a[0], b[0], a[1], a[2]) for a, b in pairwise(knots) if b[0] > a[0]]
 
     def _march(self) -> Iterator[Phase]:
-        t0 = self.arrival_time
-        flow = Motion(t0, 0.0, self.speed)
-        barrier = Motion(t0, 0.0, self.barrier_initial_velocity)
-        yield Phase("approach", t0, 0.0, 0.0, 0.0, flow, barrier)
+        flow = Motion(0.0, 0.0, self.speed)
+        barrier = Motion(0.0, 0.0, self.barrier_initial_velocity)
+        yield Phase("approach", 0.0, 0.0, 0.0, 0.0, flow, barrier)
         printed = self.variant == "as_printed"
         if printed:
             flow, barrier = self._printed_motions()
-        mass = math.inf if self.barrier_mass is None else self.barrier_mass
+        threshold = self.threshold_force
         impulse = 0.0
         for start, end, force, rate in self._force_pieces(self.impulse):
-            start, end = start + t0, end + t0
             if printed:
                 pieces = [barrier.shifted(start)]
             else:
@@ -354,10 +381,10 @@ class Impact:
                     -force / self.flow_mass,
                     -rate / self.flow_mass,
                 )
-                pieces = list(coulomb_motion(start, end, force, rate, barrier, mass, self.friction))
+                pieces = list(coulomb_motion(start, end, force, rate, barrier, self._driven_mass, threshold))
             for piece in pieces:
                 u = piece.start - start
-                above = force > self.friction or (force == self.friction and rate > 0)
+                above = force > threshold or (force == threshold and rate > 0)
                 name = "stick" if not _moves(piece) else "acceleration" if above else "deceleration"
                 yield Phase(
                     name,
@@ -370,17 +397,17 @@ class Impact:
                 )
             impulse += (end - start) * (force + (end - start) * rate / 2)
             barrier = pieces[-1]
-        yield from self._after_impact(flow.shifted(self.impact_end_time), barrier.shifted(self.impact_end_time))
+        yield from self._after_impact(flow.shifted(self.duration), barrier.shifted(self.duration))
 
     def _printed_motions(self) -> tuple[Motion, Motion]:
         """Eqs. (10), (12) and (14): the force is taken to rise until T2, friction to act from the first instant."""
-        t0, jerk = self.arrival_time, 2 * self.impulse / self.duration**2
-        flow = Motion(t0, 0.0, self.speed, 0.0, -jerk / self.flow_mass)
+        jerk = 2 * self.impulse / self.duration**2
+        flow = Motion(0.0, 0.0, self.speed, 0.0, -jerk / self.flow_mass)
         if self.barrier_mass is None or self.fixed:
-            return flow, Motion(t0, 0.0, 0.0)
+            return flow, Motion(0.0, 0.0, 0.0)
         # Eq. (14) prints v_2,0 without the time that Eqs. (16) and (A38) give it.
         deceleration = -self.friction_deceleration
-        return flow, Motion(t0, 0.0, self.barrier_initial_velocity, deceleration, jerk / self.barrier_mass)
+        return flow, Motion(0.0, 0.0, self.barrier_initial_velocity, deceleration, jerk / self.barrier_mass)
 
     def _after_impact(self, flow: Motion, barrier: Motion) -> Iterator[Phase]:
         end, deceleration = flow.start, self.friction_deceleration
@@ -440,7 +467,8 @@ def coulomb_motion(
         if t + stop >= end:
             return
         t, displacement, velocity = t + stop, piece.displacement_at(t + stop), 0.0
-        now = force + (t - start) * force_rate
+        # What stops a body cannot drive it on: keeps rounding from setting it going again at the same instant.
+        now = direction * min(direction * (force + (t - start) * force_rate), friction)
 
 
 def _breakaway(force: float, rate: float, friction: float) -> float:
@@ -460,7 +488,8 @@ def _first_stop(motion: Motion) -> float:
         return math.inf
     q = -(b + math.copysign(math.sqrt(discriminant), b)) / 2
     roots = ([q / a] if a else []) + ([c / q] if q else [])
-    return min((root for root in roots if root > 0), default=math.inf)
+    # A root of +0.0 is a positive one that underflowed: the motion starts with a velocity that is not nil.
+    return min((root for root in roots if math.copysign(1.0, root) > 0), default=math.inf)
 
 
 def _moves(motion: Motion) -> bool:
@@ -486,6 +515,9 @@ def _check(impact: Impact) -> None:
     _require("arrival_time", impact.arrival_time, 0, math.inf)
     if impact.variant not in VARIANTS:
         raise ValueError(f"variant is {impact.variant!r}, it must be one of {', '.join(VARIANTS)}.")
+    _require("vertical_load_ratio", impact.vertical_load_ratio, 0, math.inf)
+    if impact.variant == "as_printed" and impact.vertical_load_ratio:
+        raise ValueError(f"vertical_load_ratio is {impact.vertical_load_ratio!r}, it must be 0 with as_printed.")
     if impact.geometry_change is not None and impact.s1max is not None:
         raise ValueError(f"geometry_change is {impact.geometry_change!r} and s1max is {impact.s1max!r}, give only one.")
     if impact.s1max is not None:
@@ -503,3 +535,6 @@ def _check(impact: Impact) -> None:
     if impact.base_friction is None:
         raise ValueError("base_friction is missing, a barrier that is not fixed needs a number in [0, inf).")
     _require("base_friction", impact.base_friction, 0, math.inf)
+    if impact.vertical_load_ratio * impact.base_friction >= 1:
+        limit = 1 / impact.base_friction
+        raise ValueError(f"vertical_load_ratio is {impact.vertical_load_ratio!r}, it must be in [0, {limit:g}).")
