@@ -66,7 +66,7 @@ class PythonUnit:
 
 
 PYTHON_UNITS = (
-    PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", needs_impact=True),
+    PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", ("sliding.py",), needs_impact=True),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
     PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
 )
@@ -100,9 +100,9 @@ def build_python_unit(
     """
     version = version or project_version()
     sources = _shipped_sources(unit)
-    content = hashlib.sha256(
-        json.dumps([metadata.version("pythonfmu"), sorted(sources.items())]).encode()
-    ).hexdigest()[:8]
+    content = hashlib.sha256(json.dumps([metadata.version("pythonfmu"), sorted(sources.items())]).encode()).hexdigest()[
+        :8
+    ]
     stamp = re.sub(r"\W", "_", f"{unit.module}_{version}_{content}")
     package, script = f"_{stamp}", stamp
     with tempfile.TemporaryDirectory(prefix="fmu_build_") as temporary:

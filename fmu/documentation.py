@@ -28,6 +28,7 @@ def entries(interface: Interface, version: str, *, packer: str = "pythonfmu") ->
     }
     if packer == "pythonfmu":
         found["documentation/licenses/pythonfmu.txt"] = _licence_of("pythonfmu")
+    # The C unit carries the FMI headers, whose licence is the text at their top.
     return found | {f"documentation/{name}": data for name, data in reference.files(interface).items()}
 
 
@@ -73,13 +74,8 @@ def _start(variable: Variable) -> str:
 
 
 def _range(variable: Variable) -> str:
-    if variable.choice:
-        return ", ".join(f"{number} {name}" for number, (name, _) in enumerate(variable.choice.items, 1))
-    if variable.kind != "Real" or (variable.minimum is None and variable.maximum is None):
-        return ""
-    low = "(−∞" if variable.minimum is None else f"{'(' if variable.open_minimum else '['}{variable.minimum:g}"
-    high = "∞)" if variable.maximum is None else f"{variable.maximum:g}]"
-    return f"{low}, {high}"
+    bounded = variable.minimum is not None or variable.maximum is not None
+    return variable.range_text if variable.choice or bounded else ""
 
 
 def _licence_of(distribution: str) -> bytes:

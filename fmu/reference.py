@@ -44,8 +44,8 @@ def files(interface: Interface) -> dict[str, bytes]:
     slave = slave_class(instance_name="reference", resources="")
     steps = round(interface.stop_time / interface.step_size)
     names = [v.name for v in interface.of("output")]
-    input_lines = [_line("time", *(v.name for v in interface.of("input")), quoted=True)]
-    output_lines = [_line("time", *names, quoted=True)]
+    input_lines = [_header(["time", *(v.name for v in interface.of("input"))])]
+    output_lines = [_header(["time", *names])]
     slave.setup_experiment(0.0, interface.stop_time, None)
     slave.enter_initialization_mode()
     for step in range(steps + 1):
@@ -53,9 +53,9 @@ def files(interface: Interface) -> dict[str, bytes]:
         if step == 0:
             _apply(slave, inputs(0.0))
             slave.exit_initialization_mode()
-        output_lines.append(_line(time, *(slave[name] for name in names)))
+        output_lines.append(_row(time, *(slave[name] for name in names)))
         given = inputs(time)
-        input_lines.append(_line(time, *(given[v.name] for v in interface.of("input"))))
+        input_lines.append(_row(time, *(given[v.name] for v in interface.of("input"))))
         _apply(slave, given)
         if step < steps and not slave.do_step(time, interface.step_size):
             raise RuntimeError(f"The reference run of {interface.name} failed at {time:g} s.")
@@ -77,6 +77,9 @@ def _apply(slave: UnitSlave, values: dict[str, float]) -> None:
     slave.set_real(references, list(values.values()))
 
 
-def _line(*cells: object, quoted: bool = False) -> str:
-    texts = [f'"{cell}"' if quoted else repr(float(cell)) if isinstance(cell, float) else str(int(cell)) for cell in cells]  # type: ignore[call-overload]
-    return ",".join(texts) + "\n"
+def _header(names: list[str]) -> str:
+    return ",".join(f'"{name}"' for name in names) + "\n"
+
+
+def _row(*values: float) -> str:
+    return ",".join(repr(value) if isinstance(value, float) else str(int(value)) for value in values) + "\n"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from analytic.impact import PHASES, STANDARD_GRAVITY, VARIANTS, Impact, Motion, coulomb_motion
+from analytic.impact import PHASES, STANDARD_GRAVITY, VARIANTS, Impact
 
 from .interface import (
     JOULE_PER_METRE,
@@ -21,6 +22,7 @@ from .interface import (
     Variable,
 )
 from .slave import UnitError, UnitSlave
+from .sliding import slide
 
 _VARIANT_TEXTS = {
     "stick_slip": "The barrier slides only while the force exceeds its base friction",
@@ -135,6 +137,12 @@ VARIABLES = (
         open_minimum=True,
     ),
     _parameter(
+        "vertical_load_ratio",
+        "Vertical load kappa of the flow on the barrier over its horizontal force; the paper's model leaves it out",
+        0.0,
+        minimum=0.0,
+    ),
+    _parameter(
         "gravity",
         "Acceleration of gravity",
         STANDARD_GRAVITY,
@@ -144,15 +152,14 @@ VARIABLES = (
         nominal=10.0,
     ),
     Variable("variant", "parameter", VARIANT.description, "Enumeration", start=1, choice=VARIANT),
-    Variable(
-        "impact_force_source", "parameter", FORCE_SOURCE.description, "Enumeration", start=1, choice=FORCE_SOURCE
-    ),
+    Variable("impact_force_source", "parameter", FORCE_SOURCE.description, "Enumeration", start=1, choice=FORCE_SOURCE),
     _force_input(
         "external_force",
         "Horizontal force on the barrier per metre of width beside the impact, positive in the direction of the flow",
     ),
     _force_input(
-        "vertical_load", "Downward load on the barrier per metre of width beside its weight; it raises the base friction"
+        "vertical_load",
+        "Downward load on the barrier per metre of width beside its weight; it raises the base friction",
     ),
     _force_input(
         "impact_force_input",
@@ -170,7 +177,10 @@ VARIABLES = (
     _output("barrier_velocity", "Velocity v2 of the barrier", unit=METRE_PER_SECOND),
     _output("barrier_displacement", "Displacement of the barrier since the start", unit=METRE),
     _output(
-        "flow_velocity", "Velocity v1 of the flow's centre of mass, from its momentum", unit=METRE_PER_SECOND, nominal=10.0
+        "flow_velocity",
+        "Velocity v1 of the flow's centre of mass, from its momentum",
+        unit=METRE_PER_SECOND,
+        nominal=10.0,
     ),
     _output(
         "flow_kinetic_energy",
@@ -252,15 +262,21 @@ class SlidingBarrier:
             self._follow_closed_form(end)
             return
         self.integrated = True
-        impact, motion = self.impact, Motion(self.time, self.displacement, self.velocity)
-        friction = impact.friction_deceleration / impact.gravity
-        friction *= max((impact.barrier_mass or 0.0) * impact.gravity + loads.vertical_load, 0.0)
-        mass = float("inf") if impact.barrier_mass is None else impact.barrier_mass
-        for start, stop, force, rate in self._force_pieces(end, loads):
-            for piece in coulomb_motion(start, stop, force + loads.external_force, rate, motion, mass, friction):
-                motion = piece
-            motion = motion.shifted(stop)
-        self.displacement, self.velocity = motion.displacement, motion.velocity
+        impact = self.impact
+        tangent = impact.base_friction or 0.0
+        weight = max((impact.barrier_mass or 0.0) * impact.gravity + loads.vertical_load, 0.0)
+        share = 0.0 if self.force_is_input else impact.vertical_load_ratio
+        for duration, force, rate in () if impact.fixed else self._force_pieces(end, loads):
+            self.displacement, self.velocity = slide(
+                self.displacement,
+                self.velocity,
+                duration,
+                force + loads.external_force,
+                rate,
+                tangent * (weight + share * force),
+                tangent * share * rate,
+                impact.barrier_mass or math.inf,
+            )
         if self.force_is_input:
             self.force = loads.impact_force
             self.impulse += self.force * (end - self.time)
@@ -268,22 +284,27 @@ class SlidingBarrier:
         else:
             self.force = impact.force(end)
         self.time = end
-        self.phase = self._phase(self.force + loads.external_force, friction)
+        self.phase = self._phase(self.force + loads.external_force, tangent * (weight + share * self.force))
 
-    def _force_pieces(self, end: float, loads: Loads) -> list[tuple[float, float, float, float]]:
-        """Start, end, impact force at the start and its rate, of each piece of the step in which it is linear."""
+    def _force_pieces(self, end: float, loads: Loads) -> list[tuple[float, float, float]]:
+        """Duration, impact force at the start and its rate of each piece of the step in which it is linear."""
         if self.force_is_input:
-            return [(self.time, end, loads.impact_force, 0.0)] if end > self.time else []
+            return [(end - self.time, loads.impact_force, 0.0)]
         impact = self.impact
-        corners = (impact.arrival_time, impact.peak_time, impact.impact_end_time)
-        times = [self.time, *(t for t in corners if self.time < t < end), end]
+        arrival, peak_time, impact_end = impact.arrival_time, impact.peak_time, impact.impact_end_time
+        rise = impact.peak_force / (peak_time - arrival)
+        fall = -impact.peak_force / (impact_end - peak_time) if impact_end > peak_time else 0.0
+        corners = (
+            (-math.inf, arrival, 0.0, 0.0),
+            (arrival, peak_time, 0.0, rise),
+            (peak_time, impact_end, impact.peak_force, fall),
+            (impact_end, math.inf, 0.0, 0.0),
+        )
         pieces = []
-        for start, stop in zip(times[:-1], times[1:], strict=True):
+        for corner, next_corner, force, rate in corners:
+            start, stop = max(corner, self.time), min(next_corner, end)
             if stop > start:
-                # The middle tells the pieces' slopes apart; a corner itself belongs to the piece before it.
-                middle = (start + stop) / 2
-                rate = 2 * (impact.force(stop) - impact.force(middle)) / (stop - start)
-                pieces.append((start, stop, impact.force(stop) - rate * (stop - start), rate))
+                pieces.append((stop - start, force + (start - corner) * rate if rate else force, rate))
         return pieces
 
     def _phase(self, applied: float, friction: float) -> str:
@@ -312,15 +333,24 @@ class BarrierSlidingSlave(UnitSlave):
     barrier: SlidingBarrier
 
     def start(self) -> None:
-        s1max = self["s1max"]
+        s1max, fixed = self["s1max"], self["barrier_fixed"]
         impact = Impact(
             **{
                 name: self[name]
-                for name in ("flow_mass", "flow_length", "flow_height", "speed", "arrival_time", "rise_ratio", "gravity")
+                for name in (
+                    "flow_mass",
+                    "flow_length",
+                    "flow_height",
+                    "speed",
+                    "arrival_time",
+                    "barrier_initial_velocity",
+                    "rise_ratio",
+                    "vertical_load_ratio",
+                    "gravity",
+                )
             },
-            barrier_mass=None if self["barrier_fixed"] else self["barrier_mass"],
-            barrier_initial_velocity=self["barrier_initial_velocity"],
-            base_friction=self["base_friction"],
+            barrier_mass=None if fixed else self["barrier_mass"],
+            base_friction=None if fixed else self["base_friction"],
             geometry_change=None if s1max else self["geometry_change"],
             s1max=s1max or None,
             variant=VARIANT.name_of(self["variant"]),

@@ -77,13 +77,26 @@ class Variable:
             return "fixed"
         return "continuous" if self.kind == "Real" else "discrete"
 
+    @property
+    def range_text(self) -> str:
+        """The allowed values in words: an interval with its unit, or the numbers and names of a choice."""
+        if self.choice:
+            return ", ".join(f"{number} ({name})" for number, (name, _) in enumerate(self.choice.items, 1))
+        low = -math.inf if self.minimum is None else self.minimum
+        high = math.inf if self.maximum is None else self.maximum
+        left = "(" if self.open_minimum or math.isinf(low) else "["
+        right = ")" if math.isinf(high) else "]"
+        return f"{left}{low:g}, {high:g}{right}{self._unit_text}"
+
+    @property
+    def _unit_text(self) -> str:
+        return "" if self.kind != "Real" or self.unit.name == "1" else f" {self.unit.name}"
+
     def fault(self, value: Value) -> str | None:
         """One sentence that names the variable, its value and its range if the value is not allowed, else None."""
-        if self.kind == "Enumeration" and self.choice is not None:
-            if value in range(1, len(self.choice.items) + 1):
-                return None
-            allowed = ", ".join(f"{number} ({name})" for number, (name, _) in enumerate(self.choice.items, 1))
-            return f"{self.name} is {value}, it must be one of {allowed}."
+        if self.choice:
+            inside = value in range(1, len(self.choice.items) + 1)
+            return None if inside else f"{self.name} is {value}, it must be one of {self.range_text}."
         if self.kind != "Real":
             return None
         number = float(value)
@@ -91,10 +104,7 @@ class Variable:
         high = math.inf if self.maximum is None else self.maximum
         if math.isfinite(number) and number <= high and (number > low if self.open_minimum else number >= low):
             return None
-        left = "(" if self.open_minimum or math.isinf(low) else "["
-        right = ")" if math.isinf(high) else "]"
-        unit = "" if self.unit.name == "1" else f" {self.unit.name}"
-        return f"{self.name} is {number:g}{unit}, it must be a finite number in {left}{low:g}, {high:g}{right}{unit}."
+        return f"{self.name} is {number:g}{self._unit_text}, it must be a finite number in {self.range_text}."
 
 
 @dataclass(frozen=True)

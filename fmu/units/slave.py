@@ -64,9 +64,9 @@ def _sentence(error: BaseException) -> str:
 
 
 class UnitSlave(Fmi2Slave):
-    """Base of all units. A unit gives its table and the hooks ``start``, ``step``, ``snapshot``, ``restore``, ``close``.
+    """Base of all units.
 
-    Variables are kept in ``values``, in the order of the table. They are deliberately not registered with pythonfmu:
+    A unit gives its table and the hooks ``start``, ``step``, ``snapshot``, ``restore`` and ``close``. Variables are kept in ``values``, in the order of the table. They are deliberately not registered with pythonfmu:
     its getters form reference cycles, which would put off the release of a freed instance.
     """
 
@@ -89,7 +89,7 @@ class UnitSlave(Fmi2Slave):
         self._inputs = [(references[v.name], v) for v in self.interface.of("input")]
         self._outputs = [references[v.name] for v in self.interface.of("output")]
 
-    # --- hooks ---------------------------------------------------------------------------------------------------
+    # --- hooks -------------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
         """Take the parameters, which are within their ranges, and compute the outputs at the start time."""
@@ -116,7 +116,7 @@ class UnitSlave(Fmi2Slave):
     def __setitem__(self, name: str, value: Value) -> None:
         self.values[self.interface.references[name]] = value
 
-    # --- FMI life cycle ---------------------------------------------------------------------------------------------
+    # --- FMI life cycle ----------------------------------------------------------------------------------------------
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         return model_description(
@@ -194,7 +194,7 @@ class UnitSlave(Fmi2Slave):
         self.start()
         self.stale = False
 
-    # --- values --------------------------------------------------------------------------------------------------------
+    # --- values ------------------------------------------------------------------------------------------------------
 
     def _get(self, kind: str, references: Sequence[int]) -> list[Any]:
         if not self._of_kind[kind].issuperset(references):
@@ -265,7 +265,7 @@ class UnitSlave(Fmi2Slave):
     def _identity(cls) -> str:
         return f"{cls.interface.name} {cls.version}"  # of the class: pythonfmu hides it in the instance
 
-    # --- state ---------------------------------------------------------------------------------------------------------
+    # --- state -------------------------------------------------------------------------------------------------------
 
     @guarded
     def _get_fmu_state(self) -> dict[str, Any]:
@@ -299,4 +299,5 @@ class UnitSlave(Fmi2Slave):
 def _initial_value(variable: Variable) -> Value:
     if variable.start is not None:
         return variable.start
-    return {"Real": math.nan, "Enumeration": 1, "Boolean": False, "String": ""}[variable.kind]
+    undefined: dict[str, Value] = {"Real": math.nan, "Enumeration": 1, "Boolean": False, "String": ""}
+    return undefined[variable.kind]

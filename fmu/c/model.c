@@ -1,0 +1,301 @@
+/* The closed-form impact and the sliding barrier: the C twin of impact.py, sliding.py and barrier_sliding.py. */
+#include <math.h>
+
+#include "unit.h"
+
+/* --- motion on a frictional base (sliding.py) ----------------------------------------------------------------- */
+
+static double first_stop(double velocity, double acceleration, double jerk) {
+    double a = jerk / 2, b = acceleration, c = velocity;
+    if (c == 0) return a * b < 0 ? -b / a : INFINITY;
+    double discriminant = b * b - 4 * a * c;
+    if (discriminant < 0) return INFINITY;
+    double q = -(b + copysign(sqrt(discriminant), b)) / 2;
+    double first = a != 0 && q / a > 0 ? q / a : INFINITY;
+    double second = q != 0 && c / q > 0 ? c / q : INFINITY;
+    return fmin(first, second);
+}
+
+static double breakaway(double force, double force_rate, double friction, double friction_rate) {
+    for (double direction = 1; direction >= -1; direction -= 2) {
+        double excess = direction * force - friction, rate = direction * force_rate - friction_rate;
+        if (excess > 0 || (excess == 0 && rate > 0)) return direction;
+    }
+    return 0;
+}
+
+static double wait_time(double direction, double force, double force_rate, double friction, double friction_rate) {
+    double excess = direction * force - friction, rate = direction * force_rate - friction_rate;
+    return rate > 0 ? -excess / rate : INFINITY;
+}
+
+static void slide(double *displacement, double *velocity, double left, double force, double force_rate,
+                  double friction, double friction_rate, double mass) {
+    while (left > 0) {
+        double direction = copysign(1.0, *velocity);
+        int settled = 0;
+        if (*velocity == 0) {
+            direction = breakaway(force, force_rate, friction, friction_rate);
+            if (direction == 0) {
+                double forward = wait_time(1, force, force_rate, friction, friction_rate);
+                double backward = wait_time(-1, force, force_rate, friction, friction_rate);
+                double wait = backward < forward ? backward : forward;
+                direction = backward < forward ? -1 : 1;
+                if (wait >= left) return;
+                force += wait * force_rate;
+                friction += wait * friction_rate;
+                left -= wait;
+                settled = 1;
+            }
+        }
+        double acceleration = settled ? 0.0 : (force - direction * friction) / mass;
+        double jerk = (force_rate - direction * friction_rate) / mass;
+        double run = fmin(first_stop(*velocity, acceleration, jerk), left);
+        *displacement += run * (*velocity + run * (acceleration / 2 + run * jerk / 6));
+        if (run >= left) {
+            *velocity += run * (acceleration + run * jerk / 2);
+            return;
+        }
+        *velocity = 0;
+        force += run * force_rate;
+        friction += run * friction_rate;
+        left -= run;
+    }
+}
+
+/* --- the closed form (impact.py); times count from arrival --------------------------------------------------------- */
+
+typedef struct {
+    double start, stop, force, rate;
+} Piece;
+
+static void force_pieces(const Impact *impact, double peak_force, Piece pieces[4]) {
+    double T1 = impact->rise_time, T2 = impact->duration;
+    double rise = peak_force / T1, fall = T2 > T1 ? -peak_force / (T2 - T1) : 0;
+    pieces[0] = (Piece){-INFINITY, 0, 0, 0};
+    pieces[1] = (Piece){0, T1, 0, rise};
+    pieces[2] = (Piece){T1, T2, peak_force, fall};
+    pieces[3] = (Piece){T2, INFINITY, 0, 0};
+}
+
+/* Carry the barrier from the time `start` to `stop` under the triangle of force and the loads from outside. */
+static void carry(const Impact *impact, double peak_force, double start, double stop, double external, double weight,
+                  double *displacement, double *velocity) {
+    Piece pieces[4];
+    if (impact->fixed) return;
+    force_pieces(impact, peak_force, pieces);
+    for (int i = 0; i < 4; i++) {
+        double from = fmax(pieces[i].start, start), to = fmin(pieces[i].stop, stop), rate = pieces[i].rate;
+        if (!(to > from)) continue;
+        double force = rate != 0 ? pieces[i].force + (from - pieces[i].start) * rate : pieces[i].force;
+        double share = impact->vertical_load_ratio;
+        slide(displacement, velocity, to - from, force + external, rate, impact->tangent * (weight + share * force),
+              impact->tangent * share * rate, impact->mass);
+    }
+}
+
+static double weight_of(const Impact *impact) { return impact->mass * impact->gravity; }
+
+static double force_at(const Impact *impact, double since) {
+    double T1 = impact->rise_time, T2 = impact->duration, peak = impact->peak_force;
+    if (since <= 0 || since > T2) return 0;
+    return since <= T1 ? since * (peak / T1) : peak + (since - T1) * (-peak / (T2 - T1));
+}
+
+static double impulse_until(const Impact *impact, double since) {
+    double T1 = impact->rise_time, T2 = impact->duration, peak = impact->peak_force;
+    if (since <= 0) return 0;
+    if (since > T2) return impact->impulse;
+    if (since <= T1) return since * since * peak / T1 / 2;
+    return impact->impulse - peak * (T2 - since) * (T2 - since) / (T2 - T1) / 2;
+}
+
+static double common_velocity(const Impact *impact) {
+    return impact->fixed ? 0 : impact->speed - impact->impulse / impact->flow_mass;
+}
+
+static double printed_flow_velocity(const Impact *impact, double since) {
+    double T2 = impact->duration, jerk = -2 * impact->impulse / (T2 * T2) / impact->flow_mass;
+    if (since <= 0) return impact->speed;
+    if (since <= T2) return impact->speed + since * since * jerk / 2;
+    if (impact->fixed) return 0;
+    return fmax(common_velocity(impact) - (since - T2) * impact->gravity * impact->tangent, 0);
+}
+
+static void printed_barrier(const Impact *impact, double since, double *displacement, double *velocity) {
+    double T2 = impact->duration, deceleration = impact->gravity * impact->tangent;
+    double jerk = 2 * impact->impulse / (T2 * T2) / impact->mass, v20 = impact->initial_velocity;
+    double u = fmin(since, T2);
+    *velocity = v20 + u * (-deceleration + u * jerk / 2);
+    *displacement = u * (v20 + u * (-deceleration / 2 + u * jerk / 6));
+    if (since <= T2) return;
+    double v = common_velocity(impact), w = since - T2;
+    if (v <= 0) {
+        *velocity = 0;
+        return;
+    }
+    if (deceleration > 0 && w >= v / deceleration) {
+        *displacement += v * v / (2 * deceleration);
+        *velocity = 0;
+        return;
+    }
+    *displacement += w * (v - w * deceleration / 2);
+    *velocity = v - w * deceleration;
+}
+
+static void follow_closed_form(Model *model, double time) {
+    const Impact *impact = &model->impact;
+    double since = time - impact->arrival;
+    model->force = force_at(impact, since);
+    model->peak_force = impact->peak_force;
+    model->displacement = 0;
+    model->velocity = impact->initial_velocity;
+    if (since <= 0) {
+        model->displacement = since * impact->initial_velocity;
+    } else if (impact->variant == VARIANT_AS_PRINTED && !impact->fixed) {
+        printed_barrier(impact, since, &model->displacement, &model->velocity);
+    } else {
+        carry(impact, impact->peak_force, 0, since, 0, weight_of(impact), &model->displacement, &model->velocity);
+    }
+}
+
+/* Impulse that leaves flow and barrier with one velocity at T2 although friction acts until then. */
+static double momentum_closed_impulse(const Impact *impact) {
+    double stopping = impact->flow_mass * impact->speed;
+    if (impact->fixed) return stopping;
+    double share = 1 - impact->vertical_load_ratio * impact->tangent, driven_mass = impact->mass / share;
+    double T2 = impact->duration, deceleration = impact->gravity * impact->tangent;
+    double R = impact->mass * deceleration / share;
+    double reduced_mass = impact->flow_mass / (1 + impact->flow_mass / driven_mass);
+    double displacement = 0, velocity = impact->initial_velocity;
+    carry(impact, 2 * stopping / T2, 0, T2, 0, weight_of(impact), &displacement, &velocity);
+    if (velocity <= 0) return stopping;
+    double never_at_rest = reduced_mass * (impact->speed - impact->initial_velocity + deceleration * T2);
+    double ratio = R * T2 / (2 * never_at_rest), rise_ratio = impact->rise_time / T2;
+    if (ratio >= 1 || impact->initial_velocity > deceleration * ratio * rise_ratio * T2 / 2) return never_at_rest;
+    double A = reduced_mass * (impact->speed + deceleration * T2);
+    return (A + sqrt(A * A - reduced_mass * deceleration * rise_ratio * R * T2 * T2)) / 2;
+}
+
+/* --- the unit (barrier_sliding.py) ---------------------------------------------------------------------------------- */
+
+static int phase_of(const Model *model, double time, double external, double friction) {
+    const Impact *impact = &model->impact;
+    double since = time - impact->arrival;
+    int impacting = model->force > 0, moving = model->velocity != 0;
+    if (!model->integrated) {
+        if (since <= 0) return PHASE_APPROACH;
+        impacting = since <= impact->duration;
+        moving = moving || (impacting && impact->variant == VARIANT_AS_PRINTED && !impact->fixed);
+    }
+    if (!moving) {
+        if (impacting) return PHASE_STICK;
+        int arrived = impact->force_is_input ? model->peak_force > 0 : since > 0;
+        return arrived ? PHASE_REST : PHASE_APPROACH;
+    }
+    if (!impacting) return PHASE_INERTIA;
+    double direction = model->integrated ? copysign(1.0, model->velocity) : 1;
+    return direction * (model->force + external) > friction ? PHASE_ACCELERATION : PHASE_DECELERATION;
+}
+
+static void write_outputs(Unit *unit, double time, double external, double weight) {
+    Model *model = &unit->state.model;
+    const Impact *impact = &model->impact;
+    double *values = unit->state.values, since = time - impact->arrival;
+    double share = impact->force_is_input ? 0 : impact->vertical_load_ratio;
+    double friction = impact->tangent * (weight + share * model->force);
+    double v1 = impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input
+                    ? printed_flow_velocity(impact, since)
+                    : impact->speed - (impact->force_is_input ? model->impulse : impulse_until(impact, since)) /
+                                          impact->flow_mass;
+    double v2 = model->velocity;
+    values[IMPACT_FORCE] = model->force;
+    values[PEAK_FORCE] = model->peak_force;
+    values[PEAK_PRESSURE] = model->peak_force / impact->flow_height;
+    values[BARRIER_VELOCITY] = v2;
+    values[BARRIER_DISPLACEMENT] = model->displacement;
+    values[FLOW_VELOCITY] = v1;
+    values[FLOW_KINETIC_ENERGY] = impact->flow_mass * v1 * v1 / 2;
+    values[BARRIER_KINETIC_ENERGY] = impact->fixed ? 0 : impact->mass * v2 * v2 / 2;
+    values[IMPACT_PHASE] = phase_of(model, time, external, friction);
+}
+
+static int advance(Unit *unit, double end) {
+    Model *model = &unit->state.model;
+    const Impact *impact = &model->impact;
+    const double *values = unit->state.values;
+    double external = values[EXTERNAL_FORCE], load = values[VERTICAL_LOAD], force = values[IMPACT_FORCE_INPUT];
+    double start = unit->state.time, weight = fmax(weight_of(impact) + load, 0);
+    int acted = external != 0 || load != 0;
+    if (acted && impact->variant == VARIANT_AS_PRINTED)
+        return refuse(unit, "variant is 3 (as_printed), which is a set of functions of time: external_force and "
+                            "vertical_load must be 0, or choose 1 (stick_slip).");
+    if (!model->integrated && !acted) {
+        follow_closed_form(model, end);
+        write_outputs(unit, end, 0, weight_of(impact));
+        return 1;
+    }
+    model->integrated = 1;
+    if (impact->force_is_input) {
+        if (!impact->fixed)
+            slide(&model->displacement, &model->velocity, end - start, force + external, 0, impact->tangent * weight,
+                  0, impact->mass);
+        model->force = force;
+        model->impulse += force * (end - start);
+        model->peak_force = fmax(model->peak_force, force);
+    } else {
+        carry(impact, impact->peak_force, start - impact->arrival, end - impact->arrival, external, weight,
+              &model->displacement, &model->velocity);
+        model->force = force_at(impact, end - impact->arrival);
+    }
+    write_outputs(unit, end, external, weight);
+    return 1;
+}
+
+int unit_start(Unit *unit) {
+    const double *values = unit->state.values;
+    Model *model = &unit->state.model;
+    Impact *impact = &model->impact;
+    *model = (Model){0};
+    double length = values[FLOW_LENGTH], s1max = values[S1MAX], v20 = values[BARRIER_INITIAL_VELOCITY];
+    impact->fixed = values[BARRIER_FIXED] != 0;
+    if (s1max > length)
+        return refuse(unit, "s1max is %g m, it must be a number in [0, %g] m (at most the flow's length).", s1max, length);
+    if (impact->fixed && v20 != 0)
+        return refuse(unit, "barrier_initial_velocity is %g m/s, it must be 0 (the barrier is fixed).", v20);
+    if (v20 >= values[SPEED])
+        return refuse(unit, "barrier_initial_velocity is %g m/s, it must be a number in [0, %g) m/s (below the flow's speed).",
+                      v20, values[SPEED]);
+    impact->force_is_input = values[IMPACT_FORCE_SOURCE] == SOURCE_INPUT;
+    impact->variant = (int)values[VARIANT];
+    impact->flow_mass = values[FLOW_MASS];
+    impact->flow_height = values[FLOW_HEIGHT];
+    impact->speed = values[SPEED];
+    impact->mass = values[BARRIER_MASS];
+    impact->tangent = impact->fixed ? 0 : values[BASE_FRICTION];
+    impact->gravity = values[GRAVITY];
+    impact->vertical_load_ratio = values[VERTICAL_LOAD_RATIO];
+    if (impact->vertical_load_ratio * impact->tangent >= 1)
+        return refuse(unit, "vertical_load_ratio is %g, it must be a number in [0, %g) (below 1 / base_friction).",
+                      impact->vertical_load_ratio, 1 / impact->tangent);
+    impact->initial_velocity = v20;
+    impact->arrival = values[ARRIVAL_TIME];
+    double approach = impact->speed - v20;
+    impact->duration = 8 * (s1max > 0 ? s1max : length * values[GEOMETRY_CHANGE]) / (3 * approach);
+    impact->rise_time = values[RISE_RATIO] * impact->duration;
+    double reduced_mass =
+        impact->fixed ? impact->flow_mass : impact->flow_mass / (1 + impact->flow_mass / impact->mass);
+    impact->impulse =
+        impact->variant == VARIANT_MOMENTUM_CLOSED ? momentum_closed_impulse(impact) : reduced_mass * approach;
+    impact->peak_force = 2 * impact->impulse / impact->duration;
+    if (impact->force_is_input) {
+        model->velocity = v20;
+        model->integrated = 1;
+        return advance(unit, unit->state.time);
+    }
+    follow_closed_form(model, unit->state.time);
+    write_outputs(unit, unit->state.time, 0, weight_of(impact));
+    return 1;
+}
+
+int unit_step(Unit *unit, double end) { return advance(unit, end); }

@@ -1,0 +1,21 @@
+/* State of the sliding barrier; included by unit.h. Equations and names as in impact.py and barrier_sliding.py. */
+#ifndef MODEL_H
+#define MODEL_H
+
+typedef struct {
+    int fixed, force_is_input, variant;
+    double flow_mass, speed, flow_height;
+    double mass, tangent, gravity, vertical_load_ratio, initial_velocity;
+    double arrival, duration, rise_time; /* arrival time, T2, T1 [s] */
+    double impulse, peak_force;          /* J [N s/m], F_peak [N/m] */
+} Impact;
+
+typedef struct {
+    Impact impact;
+    int integrated; /* whether a load has acted from outside: the motion is then carried from step to step */
+    double displacement, velocity;
+    double impulse, peak_force; /* so far, where the force is an input */
+    double force;
+} Model;
+
+#endif
