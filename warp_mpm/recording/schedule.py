@@ -1,0 +1,94 @@
+"""When recorders record: the simulation is stepped to land exactly on each recorder's times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+
+class Simulated(Protocol):
+    """What recorders need of a simulation."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+
+    def advance(self, until: float) -> Any:
+        """Step to exactly `until` [s]."""
+
+    def sample(self) -> dict[str, float]:
+        """Quantities of the whole scene; forces are means since the sample before."""
+
+    def points(self) -> dict[str, Any]:
+        """Arrays of the material points, one row each."""
+
+
+class Schedule:
+    """Multiples of an interval, counted, so that no rounding adds up."""
+
+    def __init__(self, interval: float, start: float = 0.0):
+        """Args: interval [s] between times; start: the first time is the first multiple at or after it [s]."""
+        self.interval = interval
+        self._count = math.ceil(start / interval - 1e-6)
+
+    @property
+    def next_time(self) -> float:
+        """The time that comes next [s]."""
+        return self._count * self.interval
+
+    def due(self, time: float) -> bool:
+        """Whether the next time has come, up to rounding; if so, move on to the one after."""
+        if self.next_time - time > 1e-6 * self.interval:
+            return False
+        self._count += 1
+        return True
+
+
+class Recorder(Protocol):
+    """Writes something of the simulation at its own times."""
+
+    schedule: Schedule
+
+    def record(self, simulation: Any) -> None:
+        """Write the present state, so that it survives the end of the process."""
+
+    def close(self) -> None:
+        """Finish what was written; safe to call twice."""
+
+
+def record_until(
+    simulation: Simulated,
+    recorders: Sequence[Recorder],
+    end_time: float,
+    *,
+    on_step: Callable[[Any], None] | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Advance to `end_time` and let every recorder record at its times, at the start and at the end.
+
+    Args:
+        simulation: at its present time, not after `end_time`.
+        recorders: each is called with the simulation.
+        end_time: [s].
+        on_step: called after each stretch between records, for instance to show progress.
+        stop: asked between stretches; true ends the run early, with a last record.
+
+    Returns:
+        True when `end_time` was reached, False when stopped before.
+    """
+    for recorder in recorders:
+        if recorder.schedule.due(simulation.time):
+            recorder.record(simulation)
+    while simulation.time < end_time:
+        if stop():
+            break
+        simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]))
+        reached = simulation.time >= end_time
+        for recorder in recorders:
+            # The end is recorded even where it is no multiple of the interval.
+            if recorder.schedule.due(simulation.time) or reached:
+                recorder.record(simulation)
+        if on_step is not None:
+            on_step(simulation)
+    return simulation.time >= end_time

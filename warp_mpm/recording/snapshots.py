@@ -1,0 +1,169 @@
+"""Snapshots of the material points in one HDF5 file, laid out as VTKHDF so that ParaView opens it as an animation.
+
+Layout: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html (version 2.2, UnstructuredGrid
+with time steps). Every material point is a vertex cell. All steps lie one after another in the same data sets. The
+unit of a field is its data set's attribute `unit`: a slash in a name would be a path.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from warp_mpm.recording.quantities import POINT_FIELDS, check_known
+from warp_mpm.recording.schedule import Schedule
+
+VTK_VERTEX = 1
+
+
+class SnapshotRecorder:
+    """Writes positions and point fields, in single precision.
+
+    The file's structure and its room are laid down before the first snapshot, and later snapshots only fill numbers
+    in. A process that is killed at any moment leaves a file that opens, with all snapshots before the last.
+    """
+
+    def __init__(self, path: Path, interval: float, end_time: float):
+        """Create the file with room for the snapshots until `end_time` [s], every `interval` [s] and at the end.
+
+        Raises:
+            FileExistsError: there is one already.
+        """
+        # Newer file versions mark a file that is open for writing, and a mark left by a killed process bars readers.
+        self.schedule = Schedule(interval)
+        self._path = path
+        self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
+        self._count = 0
+        self._points = 0
+        self._file: h5py.File | None = h5py.File(path, "x", libver=("earliest", "v108"), locking=False)
+        self._root = self._file.create_group("VTKHDF")
+        self._steps: h5py.Group
+        self._fields: dict[str, h5py.Dataset] = {}
+
+    def record(self, simulation: Any) -> None:
+        """Append one snapshot."""
+        points = dict(simulation.points())
+        position = np.asarray(points.pop("position"))
+        if self._count == 0:
+            self._lay_out(len(position), {name: np.asarray(values) for name, values in points.items()})
+        assert self._file is not None
+        number, begin = len(position), self._points
+        rows = slice(begin, begin + number)
+        self._root["Points"][rows, :2] = position
+        for name, dataset in self._fields.items():
+            dataset[rows] = _as_vtk(np.asarray(points[name]))
+
+        step = self._count
+        # Readers look for a step's offsets after those of the steps before, each one longer than its cells.
+        self._root["Offsets"][begin + step : begin + step + number + 1] = np.arange(number + 1)
+        self._steps["CellOffsets"][step] = begin
+        self._steps["PointOffsets"][step] = begin
+        for offsets in self._steps["PointDataOffsets"].values():
+            offsets[step] = begin
+        for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
+            self._root[name][step] = number
+        displacement = getattr(simulation, "barrier_displacement", None)
+        self._root["FieldData/barrier_displacement"][step] = np.nan if displacement is None else displacement
+        self._file.flush()
+        # The count goes last: until it is written, a reader does not look at the new snapshot. VTK wants as many times
+        # as steps, so their data set alone grows, inside the room that is set aside for it.
+        self._count, self._points = step + 1, begin + number
+        self._steps["Values"].resize(self._count, axis=0)
+        self._steps["Values"][step] = simulation.time
+        self._steps.attrs.modify("NSteps", self._count)
+        self._file.flush()
+
+    def close(self) -> None:
+        """Give back the room that was not used and close the file."""
+        if self._file is None:
+            return
+        if self._count > 0:
+            for dataset in (self._root["Points"], self._root["Types"], *self._fields.values()):
+                dataset.resize(self._points, axis=0)
+            self._root["Offsets"].resize(self._points + self._count, axis=0)
+            for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
+                self._root[name].resize(self._count, axis=0)
+            self._root["FieldData/barrier_displacement"].resize(self._count, axis=0)
+            self._steps.visititems(
+                lambda _, item: item.resize(self._count, axis=0) if isinstance(item, h5py.Dataset) else None
+            )
+        self._file.close()
+        self._file = None
+
+    def _lay_out(self, number: int, fields: dict[str, np.ndarray]) -> None:
+        """Create every group, attribute and data set; `number` is the most points that any snapshot will have."""
+        check_known(set(fields), POINT_FIELDS)
+        root, room = self._root, self._room
+        root.attrs["Version"] = np.array([2, 2])
+        root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
+        self._dataset(root, "Points", room * number, 3, np.float32, chunk=number)
+        for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
+            self._dataset(root, name, room, None, np.int64)
+        # Cell i is the vertex i in every step: the list of vertices is shared, the types are all the fill value.
+        root.create_dataset("Connectivity", data=np.arange(number))
+        self._dataset(root, "Offsets", room * (number + 1), None, np.int64, chunk=number + 1)
+        root.create_dataset(
+            "Types", (room * number,), np.uint8, maxshape=(None,), chunks=(number,), fillvalue=VTK_VERTEX
+        )
+
+        self._steps = steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = 0
+        self._dataset(steps, "Values", 1, None, np.float64, chunk=room)
+        steps["Values"].attrs["unit"] = "s"
+        part_offsets = self._dataset(steps, "PartOffsets", room, None, np.int64)
+        part_offsets[:] = np.arange(room)
+        self._dataset(steps, "NumberOfParts", room, None, np.int64)[:] = 1
+        self._dataset(steps, "PointOffsets", room, None, np.int64)
+        self._dataset(steps, "CellOffsets", room, 1, np.int64)
+        self._dataset(steps, "ConnectivityIdOffsets", room, 1, np.int64)[:] = 0
+
+        point_data, point_offsets = root.create_group("PointData"), steps.create_group("PointDataOffsets")
+        for name, values in fields.items():
+            quantity = POINT_FIELDS[name]
+            components = _as_vtk(values[:1]).shape[1:]
+            columns = components[0] if components else None
+            dataset = self._dataset(point_data, name, room * number, columns, np.float32, chunk=number)
+            dataset.attrs["unit"], dataset.attrs["meaning"] = quantity.unit, quantity.meaning
+            self._fields[name] = dataset
+            self._dataset(point_offsets, name, room, None, np.int64)
+
+        field_data, field_offsets = root.create_group("FieldData"), steps.create_group("FieldDataOffsets")
+        self._dataset(field_data, "barrier_displacement", room, None, np.float64)
+        self._dataset(field_offsets, "barrier_displacement", room, None, np.int64)[:] = np.arange(room)
+        sizes = steps.create_group("FieldDataSizes")
+        self._dataset(sizes, "barrier_displacement", room, 2, np.int64)[:] = 1  # one component, one tuple
+        assert self._file is not None
+        self._file.flush()
+
+    def _dataset(
+        self,
+        group: h5py.Group,
+        name: str,
+        rows: int,
+        columns: int | None,
+        kind: type,
+        chunk: int | None = None,
+    ) -> h5py.Dataset:
+        """A data set whose room is set aside at once, so that filling it changes nothing in the file's structure."""
+        creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        creation.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        if chunk is not None:
+            creation.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        trailing = () if columns is None else (columns,)
+        creation.set_chunk((chunk or rows, *trailing))
+        space = h5py.h5s.create_simple((rows, *trailing), (h5py.h5s.UNLIMITED, *trailing))
+        identifier = h5py.h5d.create(
+            group.id, name.encode(), h5py.h5t.py_create(np.dtype(kind), logical=True), space, dcpl=creation
+        )
+        return h5py.Dataset(identifier)
+
+
+def _as_vtk(values: np.ndarray) -> np.ndarray:
+    """Values with VTK's components: vectors of three, symmetric tensors of six (xx, yy, zz, xy, yz, xz)."""
+    width = {2: 3, 4: 6}.get(values.shape[1] if values.ndim == 2 else 0)
+    if width is None:
+        return values
+    return np.pad(values, ((0, 0), (0, width - values.shape[1])))

@@ -1,0 +1,236 @@
+"""Reading a run folder: the one place that knows how runs are stored.
+
+results = Results.open("runs/set_iib")
+results.time_series["impact_force_x"]          # [samples] N/m
+results.snapshots.at(1.0)["pore_pressure"]     # [points] Pa
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm.recording import run_folder
+from warp_mpm.recording.quantities import POINT_FIELDS, TIME_SERIES
+from warp_mpm.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+COMPONENTS = {"solid_velocity": 2, "liquid_velocity": 2, "effective_stress": 4}
+"""Components of a field in the plane; VTK's others are zero."""
+
+
+class ResultsError(ValueError):
+    """A run folder that cannot be read; the message names the file and what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The material points at one time."""
+
+    time: float
+    """[s]."""
+    barrier_displacement: float | None
+    """[m]; None without a barrier."""
+    position: Array
+    """[N, 2] m."""
+    fields: dict[str, Array] = field(repr=False)
+    """Arrays with N rows in SI units: velocities [N, 2], effective_stress [N, 4] (xx, yy, zz, xy), others [N]."""
+
+    def __getitem__(self, name: str) -> Array:
+        return self.fields[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.fields
+
+
+class Snapshots:
+    """The snapshots of a run, read one at a time. A context manager; `close` sets the file free."""
+
+    def __init__(self, path: Path):
+        """Open the file.
+
+        Raises:
+            ResultsError: it is missing or damaged.
+        """
+        self._path = path
+        try:
+            self._file = h5py.File(path, "r", locking=False)
+        except OSError as error:
+            reason = "is missing" if not path.exists() else f"cannot be read as HDF5: {error}"
+            raise ResultsError(f"{path} {reason}.") from None
+        try:
+            self._root = self._file["VTKHDF"]
+            steps = self._root["Steps"]
+            self._count = min(int(steps.attrs["NSteps"]), len(steps["Values"]))
+            self.times: Array = steps["Values"][: self._count]
+            self._begin = steps["PointOffsets"][: self._count]
+            self._number = self._root["NumberOfPoints"][: self._count]
+            self.names: tuple[str, ...] = tuple(name for name in POINT_FIELDS if name in self._root["PointData"])
+        except KeyError as error:
+            self._file.close()
+            raise ResultsError(f"{path} does not hold the snapshots of a run: {error}.") from None
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        return (self[index] for index in range(self._count))
+
+    def __getitem__(self, index: int) -> Snapshot:
+        """Snapshot by its number; negative numbers count from the end.
+
+        Raises:
+            IndexError: there is no such snapshot.
+            ResultsError: the file ends too early.
+        """
+        if not -self._count <= index < self._count:
+            raise IndexError(f"{self._path} holds {self._count} snapshots; there is none with number {index}.")
+        index %= self._count
+        rows = slice(int(self._begin[index]), int(self._begin[index] + self._number[index]))
+        try:
+            fields = {}
+            for name in self.names:
+                values = self._root["PointData"][name][rows].astype(float)
+                fields[name] = values[:, : COMPONENTS[name]] if name in COMPONENTS else values
+            displacement = float(self._root["FieldData/barrier_displacement"][index])
+            position = self._root["Points"][rows, :2].astype(float)
+        except (OSError, KeyError) as error:
+            raise ResultsError(f"{self._path} is damaged: {error}.") from None
+        return Snapshot(
+            time=float(self.times[index]),
+            barrier_displacement=None if np.isnan(displacement) else displacement,
+            position=position,
+            fields=fields,
+        )
+
+    def at(self, time: float) -> Snapshot:
+        """The snapshot nearest to `time` [s].
+
+        Raises:
+            ResultsError: there is no snapshot at all.
+        """
+        if self._count == 0:
+            raise ResultsError(f"{self._path} holds no snapshot.")
+        return self[int(np.argmin(np.abs(self.times - time)))]
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Results:
+    """A run folder, read as it is asked for."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    @classmethod
+    def open(cls, path: str | Path) -> Results:
+        """The results in a run folder, of a run that ended or still goes on.
+
+        Raises:
+            ResultsError: the folder is missing or is no run's.
+        """
+        folder = Path(path)
+        if not (folder / run_folder.RECORD).is_file():
+            reason = "holds no run (run.json is missing)" if folder.is_dir() else "is no folder"
+            raise ResultsError(f"{folder} {reason}.")
+        return cls(folder)
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The resolved scenario.
+
+        Raises:
+            ScenarioError: the file is missing or damaged.
+        """
+        return Scenario.load(self.path / run_folder.SCENARIO)
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """Versions, device, status and times of the run."""
+        return self._json(run_folder.RECORD)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Key figures of the run."""
+        return self._json(run_folder.SUMMARY)
+
+    @cached_property
+    def time_series(self) -> dict[str, Array]:
+        """Columns by name, each [samples] in SI units; a last line that was cut off is left out.
+
+        Raises:
+            ResultsError: the file is missing or damaged.
+        """
+        return read_time_series(self.path / run_folder.TIME_SERIES)
+
+    @cached_property
+    def snapshots(self) -> Snapshots:
+        """The snapshots, read one at a time.
+
+        Raises:
+            ResultsError: the file is missing or damaged.
+        """
+        return Snapshots(self.path / run_folder.SNAPSHOTS)
+
+    def _json(self, name: str) -> dict[str, Any]:
+        try:
+            content = json.loads((self.path / name).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise ResultsError(f"{self.path / name} is missing.") from None
+        except (OSError, ValueError) as error:
+            raise ResultsError(f"{self.path / name} cannot be read: {error}.") from None
+        if not isinstance(content, dict):
+            raise ResultsError(f"{self.path / name} does not hold a group of fields.")
+        return content
+
+
+def read_time_series(path: Path) -> dict[str, Array]:
+    """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
+
+    Raises:
+        ResultsError: the file is missing or damaged.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ResultsError(f"{path} is missing.") from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{path} cannot be read: {error}.") from None
+    lines = text.split("\n")[:-1]  # what follows the last line's end is empty, or a line that was cut off
+    if not lines:
+        raise ResultsError(f"{path} is empty.")
+    names = {quantity.label: name for name, quantity in TIME_SERIES.items()}
+    header = lines[0].split(",")
+    unknown = [label for label in header if label not in names]
+    if unknown:
+        raise ResultsError(f"{path} has the column {unknown[0]!r}, which no run writes.")
+    values = np.empty((len(lines) - 1, len(header)))
+    for number, line in enumerate(lines[1:]):
+        cells = line.split(",")
+        try:
+            if len(cells) != len(header):
+                raise ValueError
+            values[number] = [float(cell) for cell in cells]
+        except ValueError:
+            raise ResultsError(f"{path} is damaged in line {number + 2}.") from None
+    return {names[label]: values[:, column] for column, label in enumerate(header)}

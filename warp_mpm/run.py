@@ -1,0 +1,195 @@
+"""A whole run: a scenario in, a run folder out."""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from warp_mpm import plotting
+from warp_mpm.recording import Recorder, RunFolder, SnapshotRecorder, TimeSeriesRecorder, record_until, run_folder
+from warp_mpm.results import Results, ResultsError
+from warp_mpm.scenario import Scenario
+from warp_mpm.summary import summarize
+
+FORMAT = 1
+"""Version of the run folder's layout."""
+
+
+@dataclass(frozen=True)
+class RunProgress:
+    """Where a run stands."""
+
+    time: float
+    """Simulated time [s]."""
+    end_time: float
+    """Simulated time at which the run ends [s]."""
+    wall_time: float
+    """Since the first step [s]."""
+    sample: dict[str, float]
+    """Latest sample of the time series."""
+
+    @property
+    def rate(self) -> float:
+        """Simulated seconds per second."""
+        return self.time / self.wall_time if self.wall_time > 0.0 else 0.0
+
+    @property
+    def time_left(self) -> float | None:
+        """Wall time that is left at this rate [s]; None while it cannot be told."""
+        return (self.end_time - self.time) / self.rate if self.rate > 0.0 else None
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """What came of a run."""
+
+    path: Path
+    """The run folder."""
+    finished: bool
+    """False when it was stopped before its end."""
+    summary: dict[str, Any]
+    """Key figures, as in summary.json."""
+
+
+def run_scenario(
+    scenario: Scenario,
+    out: Path,
+    *,
+    make_simulation: Callable[[Scenario], Any],
+    force: bool = False,
+    origin: str = "",
+    on_progress: Callable[[RunProgress], None] | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> RunOutcome:
+    """Simulate a scenario and record it in a run folder.
+
+    Everything that was computed is on the disk when this returns or raises.
+
+    Args:
+        scenario: what to run.
+        out: the run folder to make.
+        make_simulation: makes the simulation, for instance `lambda scenario: Simulation(scenario, device="cpu")`.
+        force: an older run in `out` is replaced.
+        origin: where the scenario came from, for the record.
+        on_progress: called after each record.
+        stop: asked between records; true ends the run cleanly before its time.
+
+    Raises:
+        RunFolderError: `out` cannot be used; nothing was touched.
+        Exception: whatever the simulation raises; the run's record then says `failed`.
+    """
+    RunFolder.check(out, force=force)
+    preparing = time.perf_counter()
+    simulation = make_simulation(scenario)
+    started = time.perf_counter()
+    end_time, output = scenario.output.end_time_s, scenario.output
+    record = _record(scenario, simulation, origin)
+    folder = RunFolder.create(out, scenario.resolved(), record, force=force)
+
+    series = TimeSeriesRecorder(out / run_folder.TIME_SERIES, output.time_series_interval_s)
+    recorders: list[Recorder] = [
+        series,
+        SnapshotRecorder(out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time),
+    ]
+
+    def report(simulated: Any) -> None:
+        if on_progress is not None:
+            on_progress(RunProgress(simulated.time, end_time, time.perf_counter() - started, series.latest))
+
+    status, problem = "failed", None
+    try:
+        finished = record_until(simulation, recorders, end_time, on_step=report, stop=stop)
+        status = "finished" if finished else "stopped"
+    except Exception as error:
+        problem = str(error)
+        raise
+    finally:
+        for recorder in recorders:
+            # A disk that is full must not hide the error that tells so.
+            with contextlib.suppress(OSError):
+                recorder.close()
+        ended = {
+            "status": status,
+            "problem": problem,
+            "ended": _now(),
+            "simulated_time": simulation.time,
+            "steps": simulation.steps,
+            "preparation_time": started - preparing,
+            "wall_time": time.perf_counter() - started,
+        }
+        with contextlib.suppress(OSError):
+            folder.write(run_folder.RECORD, record | ended)
+    return RunOutcome(out, finished, evaluate(out))
+
+
+def evaluate(path: Path) -> dict[str, Any]:
+    """Write the summary and the figures of a run folder from its records, and return the summary.
+
+    Raises:
+        ResultsError: the records cannot be read.
+    """
+    results, folder = Results.open(path), RunFolder(path)
+    record = results.record
+    taken_over = ("status", "material_points", "steps", "wall_time", "preparation_time", "time_step_limit")
+    with results.snapshots as snapshots:
+        summary = summarize(
+            results.scenario, results.time_series, snapshots, {name: record.get(name) for name in taken_over}
+        )
+        folder.write(run_folder.SUMMARY, summary)
+        with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
+            plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
+        plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
+    return summary
+
+
+def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
+    versions = {"python": platform.python_version()}
+    for package in ("warp-mpm-impact", "warp-lang", "numpy", "h5py"):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            versions[package] = metadata.version(package)
+    return {
+        "format": FORMAT,
+        "status": "running",
+        "title": scenario.title,
+        "scenario_file": origin,
+        "command": sys.argv,
+        "started": _now(),
+        "device": simulation.device,
+        "material_points": simulation.material_points,
+        "machine": f"{platform.system()} {platform.machine()}",
+        "versions": versions,
+        **_commit(),
+    }
+
+
+def _commit() -> dict[str, Any]:
+    """Git commit of the source tree, and whether files differ from it; None where the package is installed."""
+    source = Path(__file__).parent
+
+    def git(*arguments: str) -> str | None:
+        try:
+            answer = subprocess.run(
+                ["git", "-C", str(source), *arguments], capture_output=True, text=True, timeout=5, check=True
+            )
+        except (OSError, subprocess.SubprocessError):
+            return None
+        return answer.stdout.strip()
+
+    # A package inside some other repository, in a virtual environment say, has no commit of its own.
+    tracked = git("ls-files", "--error-unmatch", Path(__file__).name) is not None
+    commit = git("rev-parse", "HEAD") if tracked else None
+    changed = git("status", "--porcelain", "--untracked-files=no", ".") if commit else None
+    return {"git_commit": commit, "git_changed": bool(changed) if commit else None}
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

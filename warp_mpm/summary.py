@@ -1,0 +1,189 @@
+"""Key figures of a run, from its time series and snapshots. SI, per metre of width."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm import mechanism
+from warp_mpm.results import Snapshots
+from warp_mpm.scenario import Scenario
+
+Array = NDArray[np.float64]
+Series = Mapping[str, Array]
+
+FILTER_WINDOW = 0.05
+"""Length [s] of the moving mean of the filtered force."""
+
+START_SHARE = 0.01
+"""Share of the peak force at which the impact starts."""
+
+END_SHARE = 0.1
+"""Share of the peak's height over the residual force at which the impact is over."""
+
+RESIDUAL_SHARE = 0.1
+"""Last share of the run over which the residual force is taken."""
+
+DEFINITIONS = {
+    "peak_force": "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
+    "its time is the end of that interval",
+    "peak_force_filtered": f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
+    "impact_start_time": f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
+    "rise_time": "T1: peak_force_filtered_time less impact_start_time",
+    "residual_force": f"mean force over the last {RESIDUAL_SHARE:.0%} of the run",
+    "impact_end_time": (
+        f"first time after the peak from which the filtered force, less the residual force, stays below "
+        f"{END_SHARE:.0%} of the filtered peak less the residual force; null if only in the last {RESIDUAL_SHARE:.0%} "
+        "of the run"
+    ),
+    "impact_duration": "T2: impact_end_time less impact_start_time",
+    "impulse": "time integral of the horizontal force on the impacted face over the whole run",
+    "impact_impulse": "the same from impact_start_time to impact_end_time",
+    "pore_pressure_max": "greatest pore pressure of any material point at any sample of the series",
+    "retained_volume": "material upstream of the crest at the end, at the flow's initial density",
+    "on_crest_volume": "material above the crest at the end",
+    "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",
+    "mechanism": mechanism.RULE,
+    "mass_error": "greatest change of either phase's mass, inside and departed together, over its initial mass",
+    "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
+    "momentum and the impulse of its weight",
+    "energy_error": "greatest energy that appeared beyond what was there at the start less the work done on the "
+    "barrier, over the flow's initial energy; plastic flow and drag only take energy away",
+}
+"""How each figure that could be understood in several ways is taken."""
+
+
+def summarize(
+    scenario: Scenario, series: Series, snapshots: Snapshots | None, run: Mapping[str, Any]
+) -> dict[str, Any]:
+    """All key figures; one that the scene does not have, or that was not reached, is None.
+
+    Args:
+        scenario: what was run.
+        series: columns of the time series.
+        snapshots: None leaves out what is measured on them.
+        run: what the run knows of itself (`material_points`, `steps`, `wall_time`, ...), taken over as it is.
+    """
+    figures: dict[str, Any] = {"title": scenario.title, "end_time": float(series["time"][-1]), **run}
+    figures |= impact_figures(series["time"], series.get("impact_force_x"))
+    figures["pore_pressure_max"], figures["pore_pressure_max_time"] = _peak(series, "pore_pressure_max")
+    figures["barrier_velocity_max"], figures["barrier_velocity_max_time"] = _peak(series, "barrier_velocity")
+    displacement = series.get("barrier_displacement")
+    figures["barrier_displacement_final"] = None if displacement is None else float(displacement[-1])
+    velocity = series.get("barrier_velocity")
+    figures["barrier_at_rest"] = None if velocity is None else bool(velocity[-1] == 0.0)
+    if snapshots is not None and len(snapshots) > 0:
+        figures |= mechanism.deposit(scenario, snapshots[-1])
+        figures["mechanism"], figures["mechanism_measures"] = mechanism.impact_mechanism(scenario, snapshots)
+    figures["mass_error"] = mass_error(series)
+    figures["momentum_error"] = momentum_error(series, scenario.gravity.acceleration_m_per_s2)
+    figures["energy_error"] = energy_error(series)
+    if "time_step" in series and len(series["time_step"]) > 1:
+        figures["time_step_smallest"] = float(series["time_step"][1:].min())
+    figures["definitions"] = DEFINITIONS
+    return {name: _finite(value) for name, value in figures.items()}
+
+
+def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
+    """Peak, times and impulses of the force on the impacted face (`DEFINITIONS`).
+
+    Args:
+        time: ends of the intervals [s], the first the start of the run.
+        force: mean over the interval that ends then [N/m]; None without a barrier.
+    """
+    names = (
+        *("peak_force", "peak_force_time", "peak_force_filtered", "peak_force_filtered_time", "residual_force"),
+        *("impact_start_time", "impact_end_time", "rise_time", "impact_duration", "impulse", "impact_impulse"),
+    )
+    figures: dict[str, float | None] = dict.fromkeys(names)
+    if force is None or len(time) < 2:
+        return figures
+    impulse = cumulative_impulse(time, force)
+    figures["impulse"] = float(impulse[-1])
+    peak = int(np.argmax(force))
+    if not force[peak] > 0.0:
+        return figures | {"peak_force": 0.0}
+    filtered = moving_mean(time, force)
+    filtered_peak = int(np.argmax(filtered))
+    start = float(time[max(int(np.argmax(force > START_SHARE * force[peak])) - 1, 0)])
+    figures |= {
+        "peak_force": float(force[peak]),
+        "peak_force_time": float(time[peak]),
+        "peak_force_filtered": float(filtered[filtered_peak]),
+        "peak_force_filtered_time": float(time[filtered_peak]),
+        "impact_start_time": start,
+        "rise_time": float(time[filtered_peak]) - start,
+    }
+    tail = float(time[-1] - RESIDUAL_SHARE * (time[-1] - time[0]))
+    residual = float((impulse[-1] - np.interp(tail, time, impulse)) / (time[-1] - tail))
+    figures["residual_force"] = residual
+    above = np.flatnonzero(filtered - residual >= END_SHARE * (filtered[filtered_peak] - residual))
+    if len(above) > 0 and above[-1] + 1 < len(time) and time[above[-1] + 1] <= tail:
+        end = float(time[above[-1] + 1])
+        figures["impact_end_time"] = end
+        figures["impact_duration"] = end - start
+        figures["impact_impulse"] = float(np.interp(end, time, impulse) - np.interp(start, time, impulse))
+    return figures
+
+
+def cumulative_impulse(time: Array, force: Array) -> Array:
+    """Impulse [N s/m] from the start to each time, of forces that are means over the interval before it."""
+    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])
+
+
+def moving_mean(time: Array, force: Array, window: float = FILTER_WINDOW) -> Array:
+    """Mean force [N/m] over `window` seconds around each time, over what there is of it at the ends of the run."""
+    impulse = cumulative_impulse(time, force)
+    low = np.maximum(time - 0.5 * window, time[0])
+    high = np.minimum(time + 0.5 * window, time[-1])
+    return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
+
+
+def mass_error(series: Series) -> float | None:
+    """Greatest relative change of either phase's mass, in the domain and departed together."""
+    errors = []
+    for phase in ("solid_mass", "liquid_mass"):
+        if phase in series and series[phase][0] > 0.0:
+            whole = series[phase] + series.get(f"left_{phase}", 0.0)
+            errors.append(float(np.abs(whole - whole[0]).max() / whole[0]))
+    return max(errors, default=None)
+
+
+def momentum_error(series: Series, gravity: float) -> float | None:
+    """Greatest momentum residual over the greatest of the flow's momentum and the impulse of its weight."""
+    if "momentum_residual_x" not in series:
+        return None
+    residual = np.hypot(series["momentum_residual_x"], series["momentum_residual_y"]).max()
+    momentum = np.hypot(series["momentum_x"], series["momentum_y"]).max()
+    mass = series["solid_mass"][0] + (series["liquid_mass"][0] if "liquid_mass" in series else 0.0)
+    scale = max(float(momentum), float(mass * gravity * (series["time"][-1] - series["time"][0])))
+    return float(residual) / scale if scale > 0.0 else None
+
+
+def energy_error(series: Series) -> float | None:
+    """Greatest energy created, over the flow's initial energy; 0 where energy was only lost."""
+    parts: Sequence[str] = ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy")
+    if any(part not in series for part in parts):
+        return None
+    total = sum((series[part] for part in parts), np.zeros(len(series["time"])))
+    total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0)
+    scale = float(sum(abs(series[part][0]) for part in parts))
+    return max(0.0, float((total - total[0]).max())) / scale if scale > 0.0 else None
+
+
+def _peak(series: Series, name: str) -> tuple[float | None, float | None]:
+    if name not in series:
+        return None, None
+    index = int(np.argmax(series[name]))
+    return float(series[name][index]), float(series["time"][index])
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no NaN: a figure that is none becomes None."""
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
