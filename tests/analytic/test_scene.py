@@ -1,0 +1,134 @@
+"""Scenes read from scenario files: what the simulator itself makes of every shipped one, and clear errors."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analytic.scene import SceneError, read_scene, scene_of
+from warp_mpm.scenario import Scenario, Trapezoid
+
+SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.json"))
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_every_shipped_scenario_reads_as_in_the_simulator(path: Path) -> None:
+    scenario = Scenario.load(path)
+    if scenario.barrier is None:
+        with pytest.raises(SceneError, match=r"barrier\.\S+ is missing"):
+            read_scene(path)
+        return
+    scene = read_scene(path)
+    assert scene.flow_mass == pytest.approx(scenario.flow.volume * scenario.flow.material.density)
+    assert scene.flow_length == pytest.approx(scenario.flow.equivalent_length)
+    assert scene.flow_height == pytest.approx(scenario.flow.depth)
+    assert scene.speed == scenario.flow.velocity_m_per_s[0]
+    assert scene.barrier_mass == pytest.approx(scenario.barrier.mass)
+    assert scene.gravity == scenario.gravity.acceleration_m_per_s2
+    if isinstance(scenario.barrier.shape, Trapezoid):
+        assert scene.face_angle == pytest.approx(scenario.barrier.shape.built_face_angle_deg)
+        assert scene.barrier_height == scenario.barrier.shape.base_crest_height[2]
+    else:
+        assert scene.barrier_height == math.inf
+    assert scene.impact().peak_force > 0
+
+
+def test_the_resolved_scenario_of_a_run_folder_is_read(tmp_path: Path) -> None:
+    source = next(path for path in SCENARIOS if path.stem == "set_iib")
+    resolved = Scenario.load(source).model_dump(mode="json")
+    (tmp_path / "scenario.json").write_text(json.dumps(resolved))
+    assert read_scene(tmp_path) == read_scene(source)
+
+
+def scenario(**changes: Any) -> dict[str, Any]:
+    """A scenario with the fields at the dotted paths replaced; ``None`` removes one."""
+    content = json.loads(next(path for path in SCENARIOS if path.stem == "set_iib").read_text())
+    for path, value in changes.items():
+        *groups, last = path.split("/")
+        at = content
+        for group in groups:
+            at = at[group]
+        if value is None:
+            del at[last]
+        else:
+            at[last] = value
+    return content
+
+
+def test_a_polygon_is_measured() -> None:
+    corners = [[-3, 0], [-6, 3], [-15, 3], [-24, 0]]  # the paper's flow of case 1, V = 45 m3/m, h = 3 m
+    flow = scene_of(scenario(**{"flow/shape": {"kind": "polygon", "vertices_m": corners}}))
+    assert (flow.flow_length, flow.flow_height, flow.distance) == pytest.approx((15, 3, 3))
+    block = [[0, 0], [-4, 0], [-4, 2], [0, 2]]
+    assert scene_of(scenario(**{"flow/shape": {"kind": "polygon", "vertices_m": block}})).flow_length == 4
+
+
+@pytest.mark.parametrize("missing", ["base_width_m", "crest_width_m", "height_m", "face_angle_deg"])
+def test_three_measures_make_the_trapezoid(missing: str) -> None:
+    shape = {
+        "kind": "trapezoid",
+        "base_width_m": 4 + 12 / math.sqrt(3),
+        "crest_width_m": 4.0,
+        "height_m": 6.0,
+        "face_angle_deg": 60.0,
+    }
+    del shape[missing]
+    found = scene_of(scenario(**{"barrier/shape": shape}))
+    assert found.barrier_mass == pytest.approx(2000 * 6 * (4 + 6 / math.sqrt(3)))
+    assert found.face_angle == pytest.approx(60)
+    assert found.barrier_height == pytest.approx(6)
+
+
+def test_what_the_closed_form_leaves_out_is_said() -> None:
+    changes: dict[str, Any] = {
+        "gravity/tilt_deg": 5,
+        "flow/velocity_m_per_s": [10, -1],
+        "ground/friction": 0.2,
+    }
+    assert len(scene_of(scenario(**changes)).remarks) == 3
+    assert scene_of(scenario()).remarks == ()
+
+
+def test_the_base_soil_s_friction_angle_counts_by_four_fifths() -> None:
+    motion = {"kind": "sliding", "mass_kg_per_m": 5e4, "base_soil_friction_angle_deg": 30.0}
+    found = scene_of(scenario(**{"barrier/motion": motion}))
+    assert found.base_friction == pytest.approx(0.8 / math.sqrt(3))
+    assert found.barrier_mass == 5e4
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"flow/shape/depth_m": None}, r"flow\.shape\.depth_m is missing\."),
+        ({"flow/shape/depth_m": "3"}, r"flow\.shape\.depth_m is '3', it must be a finite number"),
+        ({"flow/velocity_m_per_s": [-1, 0]}, r"velocity_m_per_s\[0\] is -1, the flow must move towards"),
+        ({"flow/velocity_m_per_s": 10}, r"velocity_m_per_s is 10, it must be a list of 2 finite numbers"),
+        ({"barrier": None}, r"barrier\.\S+ is missing"),
+        ({"barrier/motion": {"kind": "prescribed"}}, r"barrier\.motion\.kind is 'prescribed', the closed form knows"),
+        ({"barrier/shape/height_m": None, "barrier/shape/base_width_m": None}, r"barrier\.shape needs three of"),
+        ({"flow/shape": {"kind": "ball"}}, r"flow\.shape\.kind is 'ball'"),
+        ({"flow/shape": {"kind": "polygon", "vertices_m": [[0, 0], [1, 1]]}}, r"at least three corners"),
+        ({"flow/shape": {"kind": "polygon", "vertices_m": [[0, 0], [1, "a"], 3]}}, r"vertices_m holds \[1, 'a'\]"),
+    ],
+)
+def test_a_scene_without_an_answer_is_refused(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(SceneError, match=sentence) as error:
+        scene_of(scenario(**changes))
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"none\.json cannot be read: No such file"):
+        read_scene(tmp_path / "none.json")
+    broken = tmp_path / "broken.json"
+    broken.write_text("{")
+    with pytest.raises(SceneError, match=r"broken\.json is no valid JSON"):
+        read_scene(broken)
+    broken.write_bytes(b"\xff\xfe{")
+    with pytest.raises(SceneError, match=r"broken\.json is no valid JSON"):
+        read_scene(broken)
+    broken.write_text("[1, 2]")
+    with pytest.raises(SceneError, match=r"flow\.material\.porosity is missing"):
+        read_scene(broken)
