@@ -219,7 +219,7 @@ def read_time_series(path: Path) -> dict[str, Array]:
     lines = text.split("\n")[:-1]  # what follows the last line's end is empty, or a line that was cut off
     if not lines:
         raise ResultsError(f"{path} is empty.")
-    names = {quantity.label: name for name, quantity in TIME_SERIES.items()}
+    names = {quantity.label: quantity.name for quantity in TIME_SERIES.values()}
     header = lines[0].split(",")
     unknown = [label for label in header if label not in names]
     if unknown:

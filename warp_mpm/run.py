@@ -122,9 +122,9 @@ def run_scenario(
             "problem": problem,
             "ended": _now(),
             "simulated_time": simulation.time,
-            "steps": simulation.steps,
             "preparation_time": started - preparing,
             "wall_time": time.perf_counter() - started,
+            **simulation.record,
         }
         with contextlib.suppress(OSError):
             folder.write(run_folder.RECORD, record | ended)
@@ -139,16 +139,22 @@ def evaluate(path: Path) -> dict[str, Any]:
     """
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
-    taken_over = ("status", "material_points", "steps", "wall_time", "preparation_time", "time_step_limit")
+    taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
     with results.snapshots as snapshots:
-        summary = summarize(
-            results.scenario, results.time_series, snapshots, {name: record.get(name) for name in taken_over}
-        )
+        of_the_run = {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
+        summary = run_folder.finite(summarize(results.scenario, results.time_series, snapshots, of_the_run))
         folder.write(run_folder.SUMMARY, summary)
         with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
             plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
         plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
     return summary
+
+
+def _ruling_limit(record: dict[str, Any]) -> str | None:
+    """The limit that set most time steps; None before the first."""
+    prefix = "steps_limited_by_"
+    counts = {name.removeprefix(prefix): count for name, count in record.items() if name.startswith(prefix)}
+    return max(counts, key=lambda name: counts[name]) if any(counts.values()) else None
 
 
 def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
@@ -163,7 +169,7 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         "scenario_file": origin,
         "command": sys.argv,
         "started": _now(),
-        "device": simulation.device,
+        "device": str(simulation.device),
         "material_points": simulation.material_points,
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": versions,

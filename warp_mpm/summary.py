@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -48,7 +47,7 @@ DEFINITIONS = {
     "on_crest_volume": "material above the crest at the end",
     "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",
     "mechanism": mechanism.RULE,
-    "mass_error": "greatest change of either phase's mass, inside and departed together, over its initial mass",
+    "mass_error": "greatest change of the mass of both phases, inside and departed together, over the initial mass",
     "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
     "momentum and the impulse of its weight",
     "energy_error": "greatest energy that appeared beyond what was there at the start less the work done on the "
@@ -82,10 +81,8 @@ def summarize(
     figures["mass_error"] = mass_error(series)
     figures["momentum_error"] = momentum_error(series, scenario.gravity.acceleration_m_per_s2)
     figures["energy_error"] = energy_error(series)
-    if "time_step" in series and len(series["time_step"]) > 1:
-        figures["time_step_smallest"] = float(series["time_step"][1:].min())
     figures["definitions"] = DEFINITIONS
-    return {name: _finite(value) for name, value in figures.items()}
+    return figures
 
 
 def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
@@ -144,13 +141,11 @@ def moving_mean(time: Array, force: Array, window: float = FILTER_WINDOW) -> Arr
 
 
 def mass_error(series: Series) -> float | None:
-    """Greatest relative change of either phase's mass, in the domain and departed together."""
-    errors = []
-    for phase in ("solid_mass", "liquid_mass"):
-        if phase in series and series[phase][0] > 0.0:
-            whole = series[phase] + series.get(f"left_{phase}", 0.0)
-            errors.append(float(np.abs(whole - whole[0]).max() / whole[0]))
-    return max(errors, default=None)
+    """Greatest relative change of the mass, in the domain and departed together."""
+    if "solid_mass" not in series:
+        return None
+    whole = series["solid_mass"] + series.get("liquid_mass", 0.0) + series.get("left_mass", 0.0)
+    return float(np.abs(whole - whole[0]).max() / whole[0])
 
 
 def momentum_error(series: Series, gravity: float) -> float | None:
@@ -180,10 +175,3 @@ def _peak(series: Series, name: str) -> tuple[float | None, float | None]:
         return None, None
     index = int(np.argmax(series[name]))
     return float(series[name][index]), float(series["time"][index])
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no NaN: a figure that is none becomes None."""
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value

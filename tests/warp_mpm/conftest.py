@@ -36,6 +36,10 @@ class FlyingPoints:
         self.time = until
 
     @property
+    def record(self):
+        return {"steps": self.steps, "steps_limited_by_wave": self.steps, "steps_limited_by_output": 0}
+
+    @property
     def barrier_displacement(self):
         return 0.0 if self._fixed else 0.1 * self.time**2
 

@@ -49,6 +49,7 @@ def test_a_finished_run(tmp_path, coarse_case_1, flying_points):
     assert summary["pore_pressure_max"] == pytest.approx(1e5)
     assert summary["material_points"] == len(results.snapshots[0].position)
     assert summary["mass_error"] == 0.0
+    assert (summary["steps"], summary["time_step_limit"]) == (600, "wave")
     # The points fly off downstream: at 3 s all are beyond the crest, which is at 8.4 m.
     assert summary["overtopped_volume"] + summary["on_crest_volume"] == pytest.approx(45, rel=0.3)
 

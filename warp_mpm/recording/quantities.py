@@ -19,8 +19,11 @@ class Quantity:
         return f"{self.name} [{self.unit}]"
 
 
+_SHORT_NAMES = {"top_force_x": "top_force"}  # the crest is level, so its force along x is the paper's F_3
+
+
 def _registry(*rows: tuple[str, str, str]) -> dict[str, Quantity]:
-    return {name: Quantity(name, unit, meaning) for name, unit, meaning in rows}
+    return {name: Quantity(_SHORT_NAMES.get(name, name), unit, meaning) for name, unit, meaning in rows}
 
 
 TIME_SERIES = _registry(
@@ -31,7 +34,7 @@ TIME_SERIES = _registry(
         "force of the flow on the impacted face, F_2x; mean over the interval; + pushes downstream",
     ),
     ("impact_force_y", "N/m", "the same along y, F_2y; + lifts the barrier"),
-    ("top_force", "N/m", "force of the flow on the crest along x, F_3; mean over the interval"),
+    ("top_force_x", "N/m", "force of the flow on the crest along x, F_3; mean over the interval"),
     ("top_force_y", "N/m", "the same along y; - presses on the crest"),
     ("back_force_x", "N/m", "force of the flow on the downstream side along x; mean over the interval"),
     ("back_force_y", "N/m", "the same along y"),
@@ -55,14 +58,13 @@ TIME_SERIES = _registry(
     ("momentum_y", "N s/m", "the same along y"),
     ("momentum_residual_x", "N s/m", "momentum along x, less its start, less all recorded impulses"),
     ("momentum_residual_y", "N s/m", "the same along y"),
-    ("left_solid_mass", "kg/m", "mass of solid that has left the domain since t = 0"),
-    ("left_liquid_mass", "kg/m", "mass of liquid that has left the domain since t = 0"),
+    ("left_mass", "kg/m", "mass of both phases that has left the domain since t = 0"),
     ("left_momentum_x", "N s/m", "momentum along x that has left the domain with it"),
     ("left_momentum_y", "N s/m", "the same along y"),
     ("left_energy", "J/m", "kinetic, potential and elastic energy that has left the domain with it"),
     ("time_step", "s", "time step at the end of the interval"),
 )
-"""Columns of `timeseries.csv`."""
+"""Columns of `timeseries.csv`, by their keys in the simulation's samples."""
 
 POINT_FIELDS = _registry(
     ("solid_velocity", "m/s", "velocity of the solid, v_S"),

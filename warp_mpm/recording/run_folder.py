@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,7 @@ class RunFolder:
         return folder
 
     def write(self, name: str, content: dict[str, Any]) -> None:
-        """Write a JSON file whole or not at all."""
+        """Write a JSON file whole or not at all. A number that is none (NaN) or has no end is written as null."""
         target = self.path / name
         aside = target.with_name(name + ".new")
         with aside.open("w", encoding="utf-8") as file:
@@ -84,5 +85,14 @@ class RunFolder:
         aside.replace(target)
 
 
+def finite(value: Any) -> Any:
+    """The same with every float that JSON does not know, at any depth, replaced by None."""
+    if isinstance(value, dict):
+        return {name: finite(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _text(content: dict[str, Any]) -> str:
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

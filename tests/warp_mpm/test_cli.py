@@ -1,0 +1,175 @@
+"""The command line, with a stand-in for the simulation: output, exit codes, and what it refuses."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import warp_mpm.simulation
+from warp_mpm.cli import BAD_INPUT, DIVERGED, INTERRUPTED, app
+from warp_mpm.recording import run_folder
+from warp_mpm.results import Results
+
+SCENES = Path(__file__).parents[2] / "scenarios"
+SET_IIB = str(SCENES / "set_iib.json")
+
+
+@pytest.fixture
+def command(monkeypatch, tmp_path, flying_points):
+    monkeypatch.setattr(warp_mpm.simulation, "Simulation", flying_points)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def run(command, *arguments):
+    return command("run", SET_IIB, "--spacing", "0.5", "--until", "1", *arguments)
+
+
+def test_run_fills_the_default_folder_and_tells_the_figures(command):
+    result = run(command)
+    assert result.exit_code == 0, result.output
+    folder = Path("runs/set_iib")
+    assert {item.name for item in folder.iterdir()} == set(run_folder.OWN_FILES)
+    results = Results.open(folder)
+    assert results.scenario.numerics.spacing_m == 0.5
+    assert results.scenario.output.end_time_s == 1.0
+    assert results.record["scenario_file"] == SET_IIB
+    peak = results.summary["peak_force"]
+    assert f"{peak / 1e3:,.1f} kN/m" in result.stdout
+    for words in ("Set IIb", "peak force", "impulse", "mechanism seen", "wall time", "Results are in runs/set_iib"):
+        assert words in result.stdout
+    # In a pipe: a line when it begins to run, one for every tenth, and no control characters.
+    assert result.stdout.count("of 1 s   ") == 11
+    assert "\x1b" not in result.stdout
+
+
+def test_quiet_run_says_nothing(command):
+    result = run(command, "--quiet", "--out", "here")
+    assert (result.exit_code, result.output) == (0, "")
+    assert (Path("here") / run_folder.SUMMARY).is_file()
+
+
+def test_an_existing_run_needs_force(command):
+    assert run(command, "--out", "here").exit_code == 0
+    before = (Path("here") / run_folder.TIME_SERIES).stat()
+    result = run(command, "--out", "here")
+    assert result.exit_code == BAD_INPUT
+    assert "here holds a run already" in result.stderr
+    assert (Path("here") / run_folder.TIME_SERIES).stat() == before
+    assert run(command, "--out", "here", "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--spacing", "-1"), "numerics.spacing_m = -1.0 is not allowed"),
+        (("--spacing", "nan"), "numerics.spacing_m = NaN is not allowed"),
+        (("--until", "0"), "output.end_time_s = 0.0 is not allowed"),
+        (("--until", "soon"), "Invalid value for '--until'"),
+        (("--velocity", "3"), "No such option: --velocity"),
+    ],
+)
+def test_bad_option(command, arguments, sentence):
+    result = command("run", SET_IIB, *arguments)
+    assert result.exit_code == BAD_INPUT
+    assert sentence in result.stderr
+    assert not Path("runs").exists()
+
+
+def test_missing_scenario(command):
+    result = command("run", "none.json")
+    assert result.exit_code == BAD_INPUT
+    assert result.stderr == "none.json: Cannot read the scenario: No such file or directory.\n"
+
+
+def test_unknown_device(command, monkeypatch):
+    def refuse(scenario, device):
+        raise ValueError(f"device = {device!r} does not exist here; it must be one of cpu")
+
+    monkeypatch.setattr(warp_mpm.simulation, "Simulation", refuse)
+    result = run(command, "--device", "cuda:9")
+    assert result.exit_code == BAD_INPUT
+    assert result.stderr == "device = 'cuda:9' does not exist here; it must be one of cpu\n"
+    assert not Path("runs").exists()
+
+
+def test_divergence_keeps_what_was_computed(command, monkeypatch, flying_points):
+    class Diverging(flying_points):
+        def advance(self, until):
+            if until > 0.5:
+                raise warp_mpm.simulation.SimulationDiverged("The run diverged at t = 0.5 s.")
+            super().advance(until)
+
+    monkeypatch.setattr(warp_mpm.simulation, "Simulation", Diverging)
+    result = run(command, "--out", "here")
+    assert result.exit_code == DIVERGED
+    assert "The run diverged at t = 0.5 s. What was computed before is in here." in result.stderr
+    assert Results.open("here").time_series["time"][-1] == pytest.approx(0.5)
+    assert Results.open("here").record["status"] == "failed"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flying_points, number):
+    class Interrupted(flying_points):
+        def advance(self, until):
+            super().advance(until)
+            if until == pytest.approx(0.5):
+                os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(warp_mpm.simulation, "Simulation", Interrupted)
+    result = run(command, "--out", "here")
+    assert result.exit_code == INTERRUPTED
+    assert "Stopped at t = 0.500 s; everything up to there is in here. To run it to the end:" in result.stderr
+    assert "--force" in result.stderr
+    results = Results.open("here")
+    assert results.record["status"] == "stopped"
+    assert results.summary["end_time"] == pytest.approx(0.5)
+    assert results.snapshots.times[-1] == pytest.approx(0.5)
+    assert (Path("here") / run_folder.PRESSURE_PLOT).is_file()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler  # the shell has its Ctrl-C back
+
+
+def test_check_tells_what_a_scene_is(command):
+    result = command("check", *sorted(SCENES.glob("*.json")))
+    assert result.exit_code == 0
+    assert "set_v.json: two-phase flow of 48 m³/m, 4 m deep, 86,400 kg/m; Fr 1.60; barrier sliding" in result.stdout
+
+
+def test_check_goes_on_after_a_bad_file(command):
+    Path("bad.json").write_text(json.dumps({**json.loads(Path(SET_IIB).read_text()), "flwo": 3}))
+    result = command("check", "bad.json", SET_IIB)
+    assert result.exit_code == BAD_INPUT
+    assert result.stderr == "bad.json: flwo is not a field of a scenario; did you mean flow?\n"
+    assert "set_iib.json: two-phase" in result.stdout
+
+
+def test_schema_is_json(command):
+    schema = json.loads(command("schema").stdout)
+    assert schema["properties"]["flow"]["discriminator"]["propertyName"] == "formulation"
+    described = schema["$defs"]["Numerics"]["properties"]["spacing_m"]
+    assert described["description"]
+    assert described["default"] == 0.2
+
+
+def test_import_is_fast_and_starts_nothing():
+    code = (
+        "import time, sys; start = time.perf_counter(); import warp_mpm; "
+        "print(time.perf_counter() - start, 'warp' in sys.modules, 'numpy' in sys.modules)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert float(answer[0]) < 0.5
+    assert answer[1:] == ["False", "False"]
+
+
+def test_public_names():
+    assert set(warp_mpm.__all__) <= set(dir(warp_mpm))
+    for name in warp_mpm.__all__:
+        assert getattr(warp_mpm, name).__name__ == name
+    with pytest.raises(AttributeError, match="no attribute 'Simulatoin'"):
+        _ = warp_mpm.Simulatoin

@@ -1,0 +1,149 @@
+"""The command line: `python -m warp_mpm run | check | schema`.
+
+Exit codes: 0 done, 2 the input cannot be used (one sentence says why), 3 the simulation diverged, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from warp_mpm.scenario import Scenario
+
+BAD_INPUT, DIVERGED, INTERRUPTED = 2, 3, 130
+
+app = typer.Typer(
+    help="Debris flows that hit a rigid barrier which may slide, by the two-phase Material Point Method.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def main() -> None:
+    """Entry point of `python -m warp_mpm` and of the installed command `warp-mpm`."""
+    app(prog_name="warp-mpm" if Path(sys.argv[0]).name.startswith("warp-mpm") else "python -m warp_mpm")
+
+
+@app.command(
+    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib --spacing 0.25 --until 2"
+)
+def run(
+    scenario_file: Annotated[
+        Path, typer.Argument(metavar="SCENARIO", help="Scenario file (JSON).", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results.", show_default="runs/NAME of the scenario")
+    ] = None,
+    device: Annotated[str, typer.Option(help="Warp device: cpu, cuda:0, ...")] = "cpu",
+    spacing: Annotated[
+        float | None, typer.Option(help="Grid spacing [m].", show_default="that of the scenario")
+    ] = None,
+    until: Annotated[float | None, typer.Option(help="End time [s].", show_default="that of the scenario")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
+) -> None:
+    """Simulate a scenario and write its results into a folder.
+
+    The folder then holds the resolved scenario, the time series (timeseries.csv), the key figures (summary.json), the
+    material points at intervals (snapshots.vtkhdf, for ParaView and h5py), two figures and the run's record (run.json).
+    Ctrl-C ends the run cleanly and keeps all that was computed.
+    """
+    scenario = _scenario(scenario_file, spacing, until)
+    folder = out if out is not None else Path("runs") / scenario_file.stem
+
+    from warp_mpm.recording.run_folder import RunFolder, RunFolderError
+    from warp_mpm.run import run_scenario
+    from warp_mpm.terminal import RunDisplay, StopOnSignal
+
+    try:
+        RunFolder.check(folder, force=force)
+    except RunFolderError as error:
+        _refuse(str(error))
+    from warp_mpm.simulation import Simulation, SimulationDiverged
+
+    def make_simulation(scenario: Scenario) -> Simulation:
+        try:
+            return Simulation(scenario, device=device)
+        except ValueError as error:
+            _refuse(str(error))
+
+    try:
+        with StopOnSignal() as signal, RunDisplay(scenario, device=device, quiet=quiet) as display:
+            outcome = run_scenario(
+                scenario,
+                folder,
+                make_simulation=make_simulation,
+                force=force,
+                origin=str(scenario_file),
+                on_progress=display.show,
+                stop=lambda: signal.received,
+            )
+    except RunFolderError as error:
+        _refuse(str(error))
+    except SimulationDiverged as error:
+        _complain(f"{error} What was computed before is in {folder}.")
+        raise typer.Exit(DIVERGED) from None
+    except OSError as error:
+        _complain(f"Cannot write to {folder}: {error.strerror or error}. What was written before is kept.")
+        raise typer.Exit(BAD_INPUT) from None
+    display.summarize(outcome)
+    if not outcome.finished:
+        again = " ".join(["python -m warp_mpm", *(arg for arg in sys.argv[1:] if arg != "--force"), "--force"])
+        _complain(
+            f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "
+            f"To run it to the end: {again}"
+        )
+        raise typer.Exit(INTERRUPTED)
+
+
+@app.command(epilog="Example: python -m warp_mpm check scenarios/*.json")
+def check(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
+) -> None:
+    """Check scenario files and tell what they describe; nothing is run or written."""
+    from warp_mpm.scenario import Scenario
+    from warp_mpm.scenario_errors import ScenarioError
+    from warp_mpm.terminal import described
+
+    failed = False
+    for file in files:
+        try:
+            typer.echo(f"{file}: {described(Scenario.load(file))}")
+        except ScenarioError as error:
+            failed = True
+            _complain(str(error))
+    if failed:
+        raise typer.Exit(BAD_INPUT)
+
+
+@app.command(epilog="Example: python -m warp_mpm schema > scenario.schema.json")
+def schema() -> None:
+    """Print the scenario format as JSON Schema, with which an editor completes and checks a file as it is written."""
+    from warp_mpm.scenario import json_schema
+
+    typer.echo(json_schema())
+
+
+def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenario:
+    from warp_mpm.scenario import Scenario
+    from warp_mpm.scenario_errors import ScenarioError
+
+    changes = {"numerics.spacing_m": spacing, "output.end_time_s": until}
+    try:
+        return Scenario.load(file).replaced({path: value for path, value in changes.items() if value is not None})
+    except ScenarioError as error:
+        _refuse(str(error))
+
+
+def _refuse(sentence: str) -> NoReturn:
+    _complain(sentence)
+    raise typer.Exit(BAD_INPUT)
+
+
+def _complain(sentence: str) -> None:
+    typer.secho(sentence, err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)

@@ -1,0 +1,175 @@
+"""What a person sees in the terminal while a scene runs and afterwards."""
+
+from __future__ import annotations
+
+import math
+import signal
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
+from rich.table import Table
+
+from warp_mpm.run import RunOutcome, RunProgress
+from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Sliding
+
+PLAIN_LINES = 10
+"""Lines of progress in a pipe, where there is no bar."""
+
+
+class StopOnSignal:
+    """Ctrl-C and termination ask the run to stop after its present interval; a second Ctrl-C ends it at once."""
+
+    def __init__(self) -> None:
+        self.received = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, self._receive)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _receive(self, number: int, frame: FrameType | None) -> None:
+        if self.received:
+            raise KeyboardInterrupt
+        self.received = True
+
+
+class RunDisplay:
+    """A progress bar on a terminal, a few plain lines in a pipe, nothing when quiet."""
+
+    def __init__(self, scenario: Scenario, *, device: str, quiet: bool = False):
+        self._console = Console(quiet=quiet, highlight=False)
+        self._scenario, self._device = scenario, device
+        self._bar: Progress | None = None
+        self._task = TaskID(0)
+        self._lines = 0
+
+    def __enter__(self) -> Self:
+        self._console.print(f"[bold]{self._scenario.title}[/bold]")
+        self._console.print(f"{described(self._scenario)}; {self._device}")
+        if self._console.is_terminal and not self._console.quiet:
+            self._bar = Progress(
+                SpinnerColumn(),
+                BarColumn(bar_width=24),
+                TextColumn("{task.description}"),
+                console=self._console,
+                transient=True,
+            )
+            self._task = self._bar.add_task(
+                "preparing (kernels of new effects are compiled once)", total=self._scenario.output.end_time_s
+            )
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, progress: RunProgress) -> None:
+        """Bring the display up to date."""
+        if self._bar is not None:
+            self._bar.update(self._task, completed=progress.time, description=_state(progress))
+        elif progress.time >= self._lines / PLAIN_LINES * progress.end_time:
+            self._lines = math.floor(progress.time / progress.end_time * PLAIN_LINES) + 1
+            self._console.print(_state(progress), soft_wrap=True)
+
+    def summarize(self, outcome: RunOutcome) -> None:
+        """Print the key figures of a run."""
+        table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+        table.add_column(style="dim")
+        table.add_column()
+        for name, value in summary_rows(outcome.summary):
+            table.add_row(name, value)
+        self._console.print(table)
+        self._console.print(f"Results are in {outcome.path}", soft_wrap=True)
+
+
+def described(scenario: Scenario) -> str:
+    """One line on what a scenario asks for."""
+    flow, numerics = scenario.flow, scenario.numerics
+    points = flow.volume / numerics.spacing_m**2 * numerics.points_per_cell
+    parts = [
+        f"{flow.formulation.replace('_', '-')} flow of {flow.volume:g} m³/m, {flow.depth:g} m deep, "
+        f"{flow.volume * flow.material.density:,.0f} kg/m",
+        f"Fr {flow.speed / math.sqrt(STANDARD_GRAVITY * flow.depth):.2f}",
+    ]
+    if scenario.barrier is not None:
+        motion: str = scenario.barrier.motion.kind
+        if isinstance(scenario.barrier.motion, Sliding):
+            motion += f", {scenario.barrier.mass:,.0f} kg/m"
+        parts.append(f"barrier {motion}")
+    parts.append(f"about {points:,.0f} points on a {numerics.spacing_m:g} m grid, {numerics.precision}")
+    return "; ".join(parts)
+
+
+def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and value, with unit, of the figures that a person wants first; those that are None are left out."""
+
+    def kilo(name: str, unit: str, at: str | None = None) -> str | None:
+        value = summary.get(name)
+        if value is None:
+            return None
+        moment = summary.get(at) if at is not None else None
+        return f"{value / 1e3:,.1f} {unit}" + (f" at {moment:.3f} s" if moment is not None else "")
+
+    def plain(name: str, unit: str, digits: int = 2) -> str | None:
+        value = summary.get(name)
+        return None if value is None else f"{value:,.{digits}f} {unit}"
+
+    def relative(name: str) -> str | None:
+        value = summary.get(name)
+        return None if value is None else f"{value:.1e}"
+
+    volumes = [
+        f"{summary[f'{name}_volume']:.1f} {word}"
+        for name, word in (("retained", "retained"), ("on_crest", "on the crest"), ("overtopped", "beyond"))
+        if summary.get(f"{name}_volume") is not None
+    ]
+    smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
+    rows = [
+        ("peak force F₂ₓ", kilo("peak_force", "kN/m", "peak_force_time")),
+        ("  mean over 0.05 s", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
+        ("impulse", kilo("impulse", "kN s/m")),
+        ("impact from", plain("impact_start_time", "s", 3)),
+        ("rise time T₁, duration T₂", _pair(plain("rise_time", "s", 3), plain("impact_duration", "s", 3))),
+        ("pore pressure, greatest", kilo("pore_pressure_max", "kPa", "pore_pressure_max_time")),
+        ("barrier velocity, greatest", plain("barrier_velocity_max", "m/s")),
+        ("barrier displacement", plain("barrier_displacement_final", "m", 3)),
+        ("volume [m³/m]", ", ".join(volumes) or None),
+        ("mechanism seen", summary.get("mechanism")),
+        ("error of mass", relative("mass_error")),
+        ("error of momentum", relative("momentum_error")),
+        ("energy created", relative("energy_error")),
+        (
+            "time steps",
+            None if smallest is None else f"{summary['steps']:,}, smallest {smallest:.2e} s, mostly limited by {limit}",
+        ),
+        ("wall time", plain("wall_time", "s", 1)),
+    ]
+    return [(name, value) for name, value in rows if value is not None]
+
+
+def _pair(first: str | None, second: str | None) -> str | None:
+    return None if first is None else f"{first}, {second or 'not over at the end of the run'}"
+
+
+def _state(progress: RunProgress) -> str:
+    left = progress.time_left
+    parts = [f"t = {progress.time:.2f} of {progress.end_time:g} s", f"{progress.rate:.3g} s/s"]
+    if left is not None:
+        parts.append(f"{int(left) // 60}:{int(left) % 60:02d} left")
+    if "impact_force_x" in progress.sample:
+        parts.append(f"F₂ₓ = {progress.sample['impact_force_x'] / 1e3:.0f} kN/m")
+    if "barrier_velocity" in progress.sample:
+        parts.append(f"v₂ = {progress.sample['barrier_velocity']:.2f} m/s")
+    return "   ".join(parts)
