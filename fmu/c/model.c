@@ -275,9 +275,11 @@ int unit_start(Unit *unit) {
     impact->tangent = impact->fixed ? 0 : values[BASE_FRICTION];
     impact->gravity = values[GRAVITY];
     impact->vertical_load_ratio = values[VERTICAL_LOAD_RATIO];
+    if (impact->variant == VARIANT_AS_PRINTED && impact->vertical_load_ratio != 0)
+        return refuse(unit, "vertical_load_ratio is %g, it must be 0 with as_printed.", impact->vertical_load_ratio);
     if (impact->vertical_load_ratio * impact->tangent >= 1)
-        return refuse(unit, "vertical_load_ratio is %g, it must be a number in [0, %g) (below 1 / base_friction).",
-                      impact->vertical_load_ratio, 1 / impact->tangent);
+        return refuse(unit, "vertical_load_ratio is %g, it must be in [0, %g).", impact->vertical_load_ratio,
+                      1 / impact->tangent);
     impact->initial_velocity = v20;
     impact->arrival = values[ARRIVAL_TIME];
     double approach = impact->speed - v20;

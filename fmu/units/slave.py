@@ -66,13 +66,13 @@ def _sentence(error: BaseException) -> str:
 class UnitSlave(Fmi2Slave):
     """Base of all units.
 
-    A unit gives its table and the hooks ``start``, ``step``, ``snapshot``, ``restore`` and ``close``. Variables are kept in ``values``, in the order of the table. They are deliberately not registered with pythonfmu:
-    its getters form reference cycles, which would put off the release of a freed instance.
+    A unit gives its table and the hooks ``start``, ``step``, ``snapshot``, ``restore`` and ``close``. Variables are
+    kept in ``values``, in the order of the table. They are deliberately not registered with pythonfmu: its getters form
+    reference cycles, which would put off the release of a freed instance.
     """
 
     interface: ClassVar[Interface]
     version: ClassVar[str] = "development"
-    needs_inputs_finite: ClassVar[bool] = True
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
