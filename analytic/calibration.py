@@ -1,0 +1,360 @@
+"""The closed form's two numbers, s1max (or lambda) and tau, from the force history of an impact.
+
+Plain arrays in, so that the history may come from the simulator, a flume or the field. Two rules:
+
+``peak``
+    The paper's (section 3.2): s1max from the peak force by Eqs. (5) and (7), tau = T1 / T2 from its time.
+``least_squares``
+    The triangle that is nearest to F(t), in the mean square from arrival to the end of the impact.
+
+A peak is a matter of filtering, and so are lambda and tau. Here the force is smoothed by a moving mean whose length is
+part of the result.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.arrays import trajectory
+from analytic.impact import Impact
+from analytic.scene import Scene
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FILTER_WINDOW = 0.05
+"""Length of the moving mean [s]; the simulator's own summary uses the same."""
+
+START_SHARE = 0.01
+"""Share of the peak force at which the impact starts."""
+
+END_SHARE = 0.1
+"""Share of the peak's height over the residual force at which the impact is over."""
+
+RESIDUAL_SHARE = 0.1
+"""Last share of the record over which the residual force is taken."""
+
+RULES = ("peak", "least_squares")
+
+
+class CalibrationError(ValueError):
+    """A history from which nothing can be calibrated; one sentence that says why."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a force history says about an impact. Times count from the start of the record, SI units."""
+
+    arrival_time: float
+    """Start of the first interval in which the force exceeds 1 % of its peak [s]."""
+    peak_force: float
+    """Largest value of the filtered force [N/m]."""
+    peak_time: float
+    """Its time [s]."""
+    end_time: float
+    """Time after which the filtered force stays within 10 % of the peak above the residual force [s]."""
+    impulse: float
+    """Integral of the force from arrival to end [N s/m]."""
+    residual_force: float
+    """Mean force over the last tenth of the record, mostly the thrust of what has come to rest [N/m]."""
+    filter_window: float
+    """Length of the moving mean [s]."""
+
+    @property
+    def rise_time(self) -> float:
+        """T1 [s]."""
+        return self.peak_time - self.arrival_time
+
+    @property
+    def duration(self) -> float:
+        """T2 [s]."""
+        return self.end_time - self.arrival_time
+
+    @property
+    def filter_rule(self) -> str:
+        """How the peak was filtered, in words."""
+        return f"peak of the moving mean over {self.filter_window:g} s, time from the first force above 1 % of the peak"
+
+
+def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> Measured:
+    """Peak, times and impulse of a force history.
+
+    Parameters
+    ----------
+    time: ends of the sampling intervals [s], increasing; the first is the start of the record.
+    force: mean force over the interval that ends then [N/m].
+    filter_window: length of the moving mean [s] >= 0; 0 leaves the force as it is.
+
+    Raises
+    ------
+    CalibrationError: the arrays do not fit together, hold no number, or no impact.
+    """
+    time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
+    if time.ndim != 1 or time.shape != force.shape or len(time) < 3:
+        raise CalibrationError(f"time and force have the shapes {time.shape} and {force.shape}, they must be alike.")
+    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(force)) and np.all(np.diff(time) > 0)):
+        raise CalibrationError("time and force must be finite, and time must increase.")
+    if not (math.isfinite(filter_window) and filter_window >= 0):
+        raise CalibrationError(f"filter_window is {filter_window:g}, it must be a number in [0, inf).")
+    if not force.max() > 0:
+        raise CalibrationError("The force is never above nil, there is no impact to calibrate on.")
+    filtered = moving_mean(time, force, filter_window)
+    peak = int(np.argmax(filtered))
+    if peak == len(time) - 1:
+        raise CalibrationError("The force still rises when the record ends, there is no peak to calibrate on.")
+    first = int(np.argmax(force > START_SHARE * force.max()))
+    arrival = float(time[max(first - 1, 0)])
+    residual = max(float(filtered[time >= time[-1] - RESIDUAL_SHARE * (time[-1] - time[0])].mean()), 0.0)
+    threshold = residual + END_SHARE * (filtered[peak] - residual)
+    above = np.flatnonzero(filtered[peak:] >= threshold)
+    end = peak + int(above[-1]) + 1
+    end_time = float(time[min(end, len(time) - 1)])
+    impulse = cumulative_impulse(time, force)
+    return Measured(
+        arrival_time=arrival,
+        peak_force=float(filtered[peak]),
+        peak_time=float(time[peak]),
+        end_time=end_time,
+        impulse=float(np.interp(end_time, time, impulse) - np.interp(arrival, time, impulse)),
+        residual_force=residual,
+        filter_window=filter_window,
+    )
+
+
+def cumulative_impulse(time: Array, force: Array) -> Array:
+    """Impulse since the first time [N s/m] of a force given as means over the intervals that end at ``time``."""
+    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])
+
+
+def moving_mean(time: Array, force: Array, window: float) -> Array:
+    """Mean of the force over ``window`` [s] around the middle of each interval; shorter at the ends of the record."""
+    if window == 0:
+        return force
+    impulse = cumulative_impulse(time, force)
+    low, high = np.maximum(time - window / 2, time[0]), np.minimum(time + window / 2, time[-1])
+    return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
+
+
+# --- the two rules ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A closed form fitted to a force history."""
+
+    rule: str
+    """One of ``RULES``."""
+    s1max: float
+    """[m], as the rule gives it."""
+    geometry_change: float
+    """lambda = s1max / L_1,0 [-], as the rule gives it."""
+    rise_ratio: float
+    """tau = T1 / T2 [-], as the rule gives it."""
+    within_range: bool
+    """Whether s1max <= L_1,0 and tau <= 1; if not, ``impact`` uses the nearest values that are."""
+    vertical_load_ratio: float
+    """kappa [-] of ``impact``."""
+    impact: Impact
+    """The closed form on the clock of the record."""
+    measured: Measured
+
+
+def calibrate(
+    time: Array,
+    force: Array,
+    scene: Scene,
+    *,
+    rule: str = RULES[0],
+    filter_window: float = FILTER_WINDOW,
+    vertical_load_ratio: float = 0.0,
+) -> Calibration:
+    """Fit s1max and tau of the variant ``stick_slip`` to a force history.
+
+    Parameters
+    ----------
+    time, force, filter_window: as in ``measure``.
+    scene: masses, length and speed of the flow, and the barrier.
+    rule: one of ``RULES``.
+    vertical_load_ratio: kappa of the closed form; it moves the barrier, not the force.
+
+    Raises
+    ------
+    CalibrationError: the history holds no impact, or the rule is unknown.
+    """
+    if rule not in RULES:
+        raise CalibrationError(f"rule is {rule!r}, it must be one of {', '.join(RULES)}.")
+    time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
+    measured = measure(time, force, filter_window)
+    s1max, rise_ratio = _by_peak(measured, scene)
+    if rule == "least_squares":
+        s1max, rise_ratio = _by_least_squares(time, force, measured, scene, start=(s1max, rise_ratio))
+    # A fit that ends on a bound is as little within the range as a peak that lies beyond it.
+    within = s1max < scene.flow_length * (1 - 1e-6) and rise_ratio < 1 - 1e-6
+    impact = scene.impact(
+        s1max=min(s1max, scene.flow_length),
+        rise_ratio=min(rise_ratio, 1.0),
+        arrival_time=measured.arrival_time,
+        vertical_load_ratio=0.0 if scene.fixed else vertical_load_ratio,
+    )
+    return Calibration(
+        rule=rule,
+        s1max=s1max,
+        geometry_change=s1max / scene.flow_length,
+        rise_ratio=rise_ratio,
+        within_range=within,
+        vertical_load_ratio=impact.vertical_load_ratio,
+        impact=impact,
+        measured=measured,
+    )
+
+
+def _reduced_mass(scene: Scene) -> float:
+    return (
+        scene.flow_mass if scene.barrier_mass is None else scene.flow_mass / (1 + scene.flow_mass / scene.barrier_mass)
+    )
+
+
+def _by_peak(measured: Measured, scene: Scene) -> tuple[float, float]:
+    """s1max = (3/4) mu v^2 / F_peak, from Eqs. (5) and (7), and tau = T1 / T2 with T2 of Eq. (8)."""
+    s1max = 0.75 * _reduced_mass(scene) * scene.speed**2 / measured.peak_force
+    return s1max, measured.rise_time / (8 * s1max / (3 * scene.speed))
+
+
+def _by_least_squares(
+    time: Array, force: Array, measured: Measured, scene: Scene, start: tuple[float, float]
+) -> tuple[float, float]:
+    from scipy.optimize import least_squares
+
+    inside = (time > measured.arrival_time) & (time <= measured.end_time)
+    widths = np.diff(time, prepend=time[0])[inside]
+    ends, starts = time[inside], time[inside] - widths
+    scale = np.sqrt(widths) / (measured.peak_force * math.sqrt(widths.sum()))
+
+    def residuals(parameters: Array) -> Array:
+        impact = scene.impact(
+            s1max=parameters[0] * scene.flow_length, rise_ratio=parameters[1], arrival_time=measured.arrival_time
+        )
+        # The history holds means over intervals, hence the impulse over each and not the force at its end.
+        mean = (trajectory(impact, ends).impulse - trajectory(impact, starts).impulse) / widths
+        return (mean - force[inside]) * scale
+
+    low, high = np.array([1e-3, 1e-3]), np.array([1.0, 1.0])
+    first = np.clip([start[0] / scene.flow_length, start[1]], 1.01 * low, 0.99 * high)
+    # A triangle has kinks; two starts keep the fit out of the poorer of two valleys.
+    fits = [least_squares(residuals, x0, bounds=(low, high), xtol=1e-12) for x0 in (first, np.array([0.5, 0.3]))]
+    best = min(fits, key=lambda fit: fit.cost)
+    return float(best.x[0] * scene.flow_length), float(best.x[1])
+
+
+def measured_vertical_load_ratio(
+    time: Array, force: Array, base_normal_force: Array, weight: float, measured: Measured
+) -> float:
+    """kappa [-]: vertical load of the flow on the barrier over its horizontal force, as impulses over the impact.
+
+    Parameters
+    ----------
+    time [s], force [N/m]: as in ``measure``.
+    base_normal_force: force with which the barrier presses on its base, mean over the interval [N/m].
+    weight: m2 g [N/m].
+    """
+    inside = (time > measured.arrival_time) & (time <= measured.end_time)
+    widths = np.diff(time, prepend=time[0])[inside]
+    return float((base_normal_force[inside] - weight) @ widths / (force[inside] @ widths))
+
+
+# --- misfits ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a closed form is from a record, as root mean squares; ``None`` where the record is silent."""
+
+    force: float
+    """Root mean square over the measured impact, over the measured peak force [-]."""
+    flow_kinetic_energy: float | None
+    """Over the measured impact, over the largest energy since arrival [-]."""
+    barrier_velocity: float | None
+    """From arrival to the end of the record, over the largest measured velocity [-]."""
+    barrier_displacement: float | None
+    """From arrival to the end of the record, over the largest measured displacement [-]."""
+
+
+def misfit(impact: Impact, series: Mapping[str, Array], measured: Measured) -> Misfit:
+    """Distance of ``impact`` from a record (columns as in ``analytic.time_series``)."""
+    time = series["time"]
+    curves = trajectory(impact, time)
+    since_arrival = time > measured.arrival_time
+    during_impact = since_arrival & (time <= measured.end_time)
+
+    def distance(name: str, computed: Array, where: Mask) -> float | None:
+        if name not in series:
+            return None
+        scale = float(np.abs(series[name][since_arrival]).max())
+        return _root_mean_square((computed - series[name])[where]) / scale if scale > 0 else None
+
+    return Misfit(
+        force=_root_mean_square((curves.force - series["impact_force_x"])[during_impact]) / measured.peak_force,
+        flow_kinetic_energy=distance("flow_kinetic_energy", curves.flow_kinetic_energy, during_impact),
+        barrier_velocity=distance("barrier_velocity", curves.barrier_velocity, since_arrival),
+        barrier_displacement=distance("barrier_displacement", curves.barrier_displacement, since_arrival),
+    )
+
+
+def _root_mean_square(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@dataclass(frozen=True)
+class KeyFigures:
+    """The quantities of the paper's Figs. 13 and 14, SI units per metre of width; ``None``: not recorded."""
+
+    peak_force: float
+    rise_time: float
+    duration: float
+    impulse: float
+    flow_kinetic_energy_at_peak: float | None
+    barrier_kinetic_energy_max: float | None
+    barrier_velocity_max: float | None
+    barrier_displacement_final: float | None
+
+
+def key_figures(impact: Impact) -> KeyFigures:
+    """Key figures of a closed form."""
+    return KeyFigures(
+        peak_force=impact.peak_force,
+        rise_time=impact.peak_time - impact.arrival_time,
+        duration=impact.duration,
+        impulse=impact.impulse,
+        flow_kinetic_energy_at_peak=impact.flow_kinetic_energy(impact.peak_time),
+        barrier_kinetic_energy_max=impact.barrier_kinetic_energy_max,
+        barrier_velocity_max=impact.barrier_velocity_max,
+        barrier_displacement_final=impact.barrier_displacement_final,
+    )
+
+
+def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> KeyFigures:
+    """Key figures of a record (columns as in ``analytic.time_series``)."""
+
+    def largest(name: str) -> float | None:
+        return float(series[name].max()) if name in series else None
+
+    energy = series.get("flow_kinetic_energy")
+    return KeyFigures(
+        peak_force=measured.peak_force,
+        rise_time=measured.rise_time,
+        duration=measured.duration,
+        impulse=measured.impulse,
+        flow_kinetic_energy_at_peak=(
+            None if energy is None else float(np.interp(measured.peak_time, series["time"], energy))
+        ),
+        barrier_kinetic_energy_max=largest("barrier_kinetic_energy"),
+        barrier_velocity_max=largest("barrier_velocity"),
+        barrier_displacement_final=float(series["barrier_displacement"][-1])
+        if "barrier_displacement" in series
+        else None,
+    )
