@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PatchCollection
+from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patches import Rectangle
@@ -116,12 +116,13 @@ def pore_pressure(results: Results, times: Sequence[float] = PRESSURE_TIMES) -> 
     frames = [snapshots.at(time) for time in wanted]
     wet = "pore_pressure" in frames[0]
     shown = [_shown(frame, wet) for frame in frames]
-    top = max(float(values.max(initial=0.0)) for values in shown) or 1.0
+    # A few points of a jet that lands must not take the whole scale for themselves.
+    top = max(float(np.quantile(values, 0.998)) if len(values) else 0.0 for values in shown) or 1.0
 
     left, right, bottom, high = _window(scenario, frames)
     width = 9.0
-    panel_height = min(max(width * 0.88 * (high - bottom) / (right - left), 1.0), 3.6)
-    figure = Figure(figsize=(width, (panel_height + 0.55) * len(frames) + 0.9), layout="constrained")
+    panel_height = max(0.78 * width * (high - bottom) / (right - left), 0.8)
+    figure = Figure(figsize=(width, (panel_height + 0.35) * len(frames) + 0.8), layout="compressed")
     axes = np.atleast_1d(figure.subplots(len(frames), 1, sharex=True))
     figure.suptitle(scenario.title, fontsize=11)
     drawn: Any = None
@@ -134,7 +135,7 @@ def pore_pressure(results: Results, times: Sequence[float] = PRESSURE_TIMES) -> 
         panel.set(xlim=(left, right), ylim=(bottom, high), aspect="equal", ylabel="y [m]")
     axes[-1].set_xlabel("x [m]")
     label = "pore pressure [kPa]" if wet else "speed of the solid [m/s]"
-    figure.colorbar(drawn, ax=list(axes), label=label, shrink=0.9, pad=0.01)
+    figure.colorbar(drawn, ax=list(axes), label=label, extend="max", shrink=0.9, pad=0.01)
     return figure
 
 
@@ -159,15 +160,23 @@ def _moved(shape: Trapezoid, displacement: float) -> np.ndarray:
     return shape.polygon + np.array([displacement, 0.0])
 
 
-def _draw_points(panel: Axes, frame: Snapshot, values: np.ndarray, top: float) -> PatchCollection:
-    """Each material point as a square of its own volume, so that the picture stays to scale at any size."""
-    side = np.sqrt(frame["volume"])
-    squares = [Rectangle((x - 0.5 * a, y - 0.5 * a), a, a) for (x, y), a in zip(frame.position, side, strict=True)]
-    collection = PatchCollection(squares, cmap="viridis", linewidth=0.0, antialiased=False)
-    collection.set_array(values)
-    collection.set_clim(0.0, top)
-    panel.add_collection(collection)
-    return collection
+def _draw_points(panel: Axes, frame: Snapshot, values: np.ndarray, top: float) -> EllipseCollection:
+    """Each material point as a disc to scale, wide enough to meet its neighbours in a flow that has stretched."""
+    diameter = 1.4 * np.sqrt(frame["volume"])
+    discs = EllipseCollection(
+        diameter,
+        diameter,
+        np.zeros(len(diameter)),
+        units="xy",
+        offsets=frame.position,
+        offset_transform=panel.transData,
+        cmap="viridis",
+        linewidths=0.0,
+    )
+    discs.set_array(values)
+    discs.set_clim(0.0, top)
+    panel.add_collection(discs)
+    return discs
 
 
 def _draw_surroundings(

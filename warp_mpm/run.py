@@ -32,20 +32,15 @@ class RunProgress:
     """Simulated time [s]."""
     end_time: float
     """Simulated time at which the run ends [s]."""
-    wall_time: float
-    """Since the first step [s]."""
+    rate: float | None
+    """Simulated seconds per second, compilation left out; None until it can be told."""
     sample: dict[str, float]
     """Latest sample of the time series."""
 
     @property
-    def rate(self) -> float:
-        """Simulated seconds per second."""
-        return self.time / self.wall_time if self.wall_time > 0.0 else 0.0
-
-    @property
     def time_left(self) -> float | None:
-        """Wall time that is left at this rate [s]; None while it cannot be told."""
-        return (self.end_time - self.time) / self.rate if self.rate > 0.0 else None
+        """Wall time that is left at this rate [s]; None until it can be told."""
+        return (self.end_time - self.time) / self.rate if self.rate else None
 
 
 @dataclass(frozen=True)
@@ -101,9 +96,14 @@ def run_scenario(
         SnapshotRecorder(out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time),
     ]
 
+    first: list[float] = []
+
     def report(simulated: Any) -> None:
+        now, wall = simulated.time, time.perf_counter()
+        first.extend([] if first else [now, wall])  # kernels are compiled in the stretch before
+        rate = (now - first[0]) / (wall - first[1]) if now > first[0] else None
         if on_progress is not None:
-            on_progress(RunProgress(simulated.time, end_time, time.perf_counter() - started, series.latest))
+            on_progress(RunProgress(now, end_time, rate, series.latest))
 
     status, problem = "failed", None
     try:

@@ -10,6 +10,7 @@ from typing import Any, Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
+from rich.text import Text
 
 from warp_mpm.run import RunOutcome, RunProgress
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Sliding
@@ -46,15 +47,15 @@ class RunDisplay:
     """A progress bar on a terminal, a few plain lines in a pipe, nothing when quiet."""
 
     def __init__(self, scenario: Scenario, *, device: str, quiet: bool = False):
-        self._console = Console(quiet=quiet, highlight=False)
+        self._console = Console(quiet=quiet, highlight=False, markup=False)
         self._scenario, self._device = scenario, device
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._lines = 0
 
     def __enter__(self) -> Self:
-        self._console.print(f"[bold]{self._scenario.title}[/bold]")
-        self._console.print(f"{described(self._scenario)}; {self._device}")
+        self._console.print(self._scenario.title, style="bold")
+        self._console.print(f"{described(self._scenario)}; {self._device}", soft_wrap=True)
         if self._console.is_terminal and not self._console.quiet:
             self._bar = Progress(
                 SpinnerColumn(),
@@ -89,7 +90,7 @@ class RunDisplay:
         table.add_column(style="dim")
         table.add_column()
         for name, value in summary_rows(outcome.summary):
-            table.add_row(name, value)
+            table.add_row(Text(name), Text(value))
         self._console.print(table)
         self._console.print(f"Results are in {outcome.path}", soft_wrap=True)
 
@@ -165,9 +166,9 @@ def _pair(first: str | None, second: str | None) -> str | None:
 
 def _state(progress: RunProgress) -> str:
     left = progress.time_left
-    parts = [f"t = {progress.time:.2f} of {progress.end_time:g} s", f"{progress.rate:.3g} s/s"]
+    parts = [f"t = {progress.time:.2f} of {progress.end_time:g} s"]
     if left is not None:
-        parts.append(f"{int(left) // 60}:{int(left) % 60:02d} left")
+        parts += [f"{progress.rate:.3g} s/s", f"{int(left) // 60}:{int(left) % 60:02d} left"]
     if "impact_force_x" in progress.sample:
         parts.append(f"F₂ₓ = {progress.sample['impact_force_x'] / 1e3:.0f} kN/m")
     if "barrier_velocity" in progress.sample:

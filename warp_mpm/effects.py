@@ -1,0 +1,84 @@
+"""The effects that a scene calls for: the only thing that kernels are specialised on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What is simulated, and nothing else: an effect that is off is not compiled, not launched and has no arrays.
+
+    Two scenes with equal effects share their compiled kernels, whatever their sizes and material constants.
+    """
+
+    formulation: Literal["dry", "undrained", "two_phase"]
+    """Dry and undrained: one velocity field. Two-phase: solid and liquid velocities (a_S-a_L formulation)."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Scalar type of points and grid; time, ledger and barrier are float64 throughout."""
+    plasticity: bool = True
+    """Mohr-Coulomb with tension cut-off; off: linear elastic."""
+    volumetric_smoothing: bool = True
+    """Volume strain rates averaged over the cells' corners (anti-locking)."""
+    pressure_relaxation: bool = True
+    """Excess pore pressure drawn toward its grid projection at a given rate."""
+    transfer: Literal["flip", "apic"] = "flip"
+    """Velocity update: Sulsky's (FLIP, with a PIC share given as a rate) or affine (APIC)."""
+    drag: Literal["none", "semi_implicit", "explicit"] = "none"
+    """Interaction of the phases; only with two of them."""
+    porosity_update: bool = False
+    """Porosity follows the skeleton's volume strain; off: Dn/Dt = 0, Eq. (A11)."""
+    barrier: Literal["none", "fixed", "sliding", "driven"] = "none"
+    """Driven: its velocity is given, as a table of the scene or from outside during the run."""
+    barrier_friction: bool = False
+    ground: Literal["none", "smooth", "frictional"] = "none"
+    side_walls: bool = False
+    """Smooth vertical walls at the left or right edge of the domain."""
+
+    @property
+    def liquid(self) -> bool:
+        """Pore pressure exists."""
+        return self.formulation != "dry"
+
+    @property
+    def two_phase(self) -> bool:
+        return self.formulation == "two_phase"
+
+    @property
+    def smoothing_grid(self) -> bool:
+        """The grid of cell corners exists."""
+        return self.volumetric_smoothing or self.pressure_relaxation
+
+    @property
+    def gap_record(self) -> bool:
+        """A phase may open and has to close again before it bears pressure."""
+        return self.liquid or self.plasticity
+
+    @property
+    def friction(self) -> bool:
+        """Some surface rubs on the flow, so that the effective normal force is needed."""
+        return self.barrier_friction or self.ground == "frictional"
+
+    @property
+    def effective_contact_force(self) -> bool:
+        """The nodal pore-pressure force is kept apart (with two phases it is the liquid's force anyway)."""
+        return self.friction and self.formulation == "undrained"
+
+    @property
+    def module_name(self) -> str:
+        """Name of the Warp module: one per set of effects."""
+        flags = [self.formulation, self.precision, self.transfer, self.drag, self.barrier, self.ground]
+        flags += [
+            name
+            for name in (
+                "plasticity",
+                "volumetric_smoothing",
+                "pressure_relaxation",
+                "porosity_update",
+                "barrier_friction",
+                "side_walls",
+            )
+            if getattr(self, name)
+        ]
+        return "warp_mpm." + "-".join(flags)

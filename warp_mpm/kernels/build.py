@@ -1,0 +1,49 @@
+"""All kernels of one set of effects, built once."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from ..effects import Effects
+from .clock import make_clock
+from .constitutive import make_constitutive
+from .contact import make_contact
+from .grid_momentum import make_grid_momentum
+from .layout import layout
+from .ledger import make_ledger
+from .rigid_barrier import make_rigid_barrier
+from .shape_functions import make_shape_functions
+from .transfer import make_transfer
+
+
+@cache
+def build_kernels(effects: Effects) -> SimpleNamespace:
+    """Kernels for `effects`, and no others, in a Warp module of their own."""
+    module = effects.module_name
+    wp.set_module_options({"enable_backward": False}, module=wp.get_module(module))
+    types = layout(effects)
+    shapes = make_shape_functions(types)
+    transfer = make_transfer(types, shapes, module)
+    momentum = make_grid_momentum(types, module)
+    constitutive = make_constitutive(types, shapes, module)
+    clock = make_clock(types, module)
+    kernels = SimpleNamespace(
+        types=types,
+        clear=transfer.clear,
+        scatter=transfer.scatter,
+        move=momentum.move,
+        gather=transfer.gather,
+        update=constitutive.update,
+        start=clock.start,
+        tick=clock.tick,
+        ledger=make_ledger(types, module).ledger,
+    )
+    if effects.ground != "none" or effects.side_walls or effects.barrier != "none":
+        contact = make_contact(types, momentum, module)
+        kernels.__dict__.update(contact.kernels)
+        if effects.barrier == "sliding":
+            kernels.slide = make_rigid_barrier(types, contact, module).slide
+    return kernels

@@ -1,0 +1,237 @@
+"""End of the step at the material points: strains, effective stress, pore pressure, position ("update stress last")."""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+from .layout import (
+    GRID_SHIFT,
+    LEFT_ENERGY,
+    LEFT_LIQUID_MASS,
+    LEFT_MOMENTUM_X,
+    LEFT_MOMENTUM_Y,
+    LEFT_SOLID_MASS,
+    POINTS_LEFT,
+    TIME_STEP,
+)
+from .mohr_coulomb import make_return_mapping
+
+
+def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernel `update` (over points) and the function `stress_update` (also used by the element driver)."""
+    effects = types.effects
+    F = types.scalar
+    V2 = types.V2
+    V4 = types.V4
+    Points = types.Points
+    Grid = types.Grid
+    Parameters = types.Parameters
+    hats = shapes.hats
+    return_mapping = make_return_mapping(types)
+
+    TWO_PHASE = effects.two_phase
+    LIQUID = effects.liquid
+    FLIP = effects.transfer == "flip"
+    PLASTICITY = effects.plasticity
+    CORNERS = effects.smoothing_grid
+    SMOOTHING = effects.volumetric_smoothing
+    RELAXATION = effects.pressure_relaxation
+    GAP_BOUND = effects.gap_record and effects.smoothing_grid
+
+    @wp.func
+    def stress_update(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
+        """Jaumann rate of the Kirchhoff stress, Eq. (A3), then the return mapping.
+
+        `gradient` is (dvx/dx, dvx/dy, dvy/dx, dvy/dy) [1/s]; `volume_strain` the increment that the skeleton bears [-],
+        which replaces the trace. Returns the stress, the opening [-] and the deviatoric strain increment [-]. The
+        rotation is the exact one of the spin over the step (half-angle formula), so that it leaves invariants alone.
+        """
+        half = F(0.5)
+        third = volume_strain / F(3.0)
+        mean = half * volume_strain
+        stretch = half * time_step * (gradient[0] - gradient[3])
+        xx = mean + stretch
+        yy = mean - stretch
+        xy = half * time_step * (gradient[1] + gradient[2])
+        tangent = F(0.25) * time_step * (gradient[2] - gradient[1])
+        scale = F(1.0) / (F(1.0) + tangent * tangent)
+        c = (F(1.0) - tangent * tangent) * scale
+        s = F(2.0) * tangent * scale
+        centre = half * (stress[0] + stress[1])
+        difference = half * (stress[0] - stress[1])
+        turned_difference = difference * (c * c - s * s) - F(2.0) * c * s * stress[3]
+        turned_shear = F(2.0) * c * s * difference + (c * c - s * s) * stress[3]
+        keep = F(1.0) - volume_strain
+        lame = parameters.lame * volume_strain
+        double = F(2.0) * parameters.shear_modulus
+        trial = V4(
+            keep * (centre + turned_difference) + lame + double * xx,
+            keep * (centre - turned_difference) + lame + double * yy,
+            keep * stress[2] + lame,
+            keep * turned_shear + double * xy,
+        )
+        deviatoric = wp.sqrt(
+            F(2.0 / 3.0)
+            * (
+                (xx - third) * (xx - third)
+                + (yy - third) * (yy - third)
+                + third * third
+                + F(2.0) * xy * xy
+            )
+        )
+        opening = F(0.0)
+        if PLASTICITY:
+            trial, opening = return_mapping(
+                trial,
+                parameters.lame,
+                parameters.shear_modulus,
+                parameters.sin_friction,
+                parameters.sin_dilatancy,
+                parameters.cohesion_term,
+                parameters.tension_limit,
+            )
+        return trial, opening, deviatoric
+
+    @wp.kernel(module=module)
+    def update(
+        points: Points,
+        grid: Grid,
+        parameters: Parameters,
+        clock: wp.array(dtype=wp.float64),
+        counters: wp.array(dtype=wp.int32),
+        left: wp.array(dtype=wp.float64),
+    ):
+        p = wp.tid()
+        if points.inside[p] == 0:
+            return
+        time_step = F(clock[wp.static(TIME_STEP)])
+        shift = F(clock[wp.static(GRID_SHIFT)])
+        x = points.position[p]
+        gradient = points.gradient[p]
+        divergence = gradient[0] + gradient[3]
+        liquid_divergence = F(0.0)
+        if TWO_PHASE:
+            liquid_divergence = points.liquid_divergence[p]
+        smooth_excess = F(0.0)
+        smooth_residual = F(0.0)
+        filling = F(0.0)
+        if CORNERS:
+            sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
+            sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
+            ci = wp.int32(sx)
+            cj = wp.int32(sy)
+            hx = hats(sx - F(ci))
+            hy = hats(sy - F(cj))
+            smooth = F(0.0)
+            smooth_liquid = F(0.0)
+            for k in range(2):
+                for m in range(2):
+                    i = ci - 1 + k
+                    j = cj - 1 + m
+                    corner = grid.corner[i, j]
+                    h = hx[k] * hy[m]
+                    if GAP_BOUND:
+                        filling += h * corner[0] / grid.corner_volume[i, j]
+                    h = h / wp.max(corner[0], F(1.0e-30))
+                    smooth += h * corner[1]
+                    if TWO_PHASE:
+                        smooth_liquid += h * corner[4]
+                    if RELAXATION:
+                        smooth_excess += h * corner[2]
+                        smooth_residual += h * corner[3]
+            if SMOOTHING:
+                divergence = smooth
+                liquid_divergence = smooth_liquid
+
+        volume_strain = divergence * time_step
+        room = F(0.0)
+        if GAP_BOUND:
+            # A gap cannot be larger than the room that the points around leave.
+            if filling < F(1.0):
+                room = -wp.log(wp.max(filling, F(1.0e-12)))
+        borne = volume_strain
+        if PLASTICITY:
+            # A skeleton that has opened bears nothing until the gap has closed.
+            gap = points.solid_gap[p]
+            if borne < F(0.0):
+                closed = wp.min(gap, -borne)
+                gap -= closed
+                borne += closed
+            stress, opening, deviatoric = stress_update(points.stress[p], gradient, borne, time_step, parameters)
+            points.stress[p] = stress
+            gap += opening
+            if GAP_BOUND:
+                gap = wp.min(gap, room)
+            points.solid_gap[p] = gap
+            points.deviatoric_strain[p] += deviatoric
+            points.volume[p] = points.volume[p] * (F(1.0) + borne - opening)
+        else:
+            stress, opening, deviatoric = stress_update(points.stress[p], gradient, borne, time_step, parameters)
+            points.stress[p] = stress
+            points.deviatoric_strain[p] += deviatoric
+            points.volume[p] = points.volume[p] * (F(1.0) + borne)
+
+        if LIQUID:
+            # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
+            strain = points.liquid_strain[p]
+            if TWO_PHASE:
+                n = parameters.porosity
+                strain += time_step * ((F(1.0) - n) * divergence + n * liquid_divergence) / n
+            else:
+                strain += volume_strain / parameters.porosity
+            if RELAXATION:
+                # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
+                # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
+                old = points.liquid_strain[p]
+                residual = points.pressure_residual[p]
+                excess = -parameters.liquid_bulk_modulus * old - parameters.true_liquid_density * wp.dot(
+                    parameters.gravity, x
+                )
+                points.pressure_residual[p] = excess - smooth_excess
+                if strain < F(0.0):
+                    share = wp.min(parameters.relaxation_rate * time_step, F(1.0))
+                    strain = wp.min(
+                        strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
+                    )
+            if GAP_BOUND:
+                strain = wp.min(strain, room / parameters.porosity)
+            points.liquid_strain[p] = strain
+
+        if FLIP:
+            x += time_step * points.advection[p]
+        else:
+            v = points.velocity[p]
+            x += time_step * V2(v[0], v[1])
+        points.position[p] = x
+
+        sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
+        sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
+        margin = F(2.0)
+        within = (
+            sx >= margin
+            and sx < F(parameters.columns) - margin
+            and sy >= margin
+            and sy < F(parameters.rows) - margin
+        )
+        if not within:
+            points.inside[p] = 0
+            reference = points.reference_volume[p]
+            v = points.velocity[p]
+            solid = parameters.solid_density * reference
+            momentum = solid * V2(v[0], v[1])
+            energy = F(0.5) * solid * (v[0] * v[0] + v[1] * v[1])
+            total = solid
+            if TWO_PHASE:
+                liquid = parameters.liquid_density * reference
+                momentum += liquid * V2(v[2], v[3])
+                energy += F(0.5) * liquid * (v[2] * v[2] + v[3] * v[3])
+                total += liquid
+                wp.atomic_add(left, wp.static(LEFT_LIQUID_MASS), wp.float64(liquid))
+            energy -= total * wp.dot(parameters.gravity, x)
+            wp.atomic_add(left, wp.static(LEFT_SOLID_MASS), wp.float64(solid))
+            wp.atomic_add(left, wp.static(LEFT_MOMENTUM_X), wp.float64(momentum[0]))
+            wp.atomic_add(left, wp.static(LEFT_MOMENTUM_Y), wp.float64(momentum[1]))
+            wp.atomic_add(left, wp.static(LEFT_ENERGY), wp.float64(energy))
+            wp.atomic_add(counters, wp.static(POINTS_LEFT), 1)
+
+    return SimpleNamespace(update=update, stress_update=stress_update)

@@ -1,0 +1,227 @@
+"""Types and data structures of the kernels for one set of effects: an absent effect has no field here.
+
+Grid indices: node (i, j) lies at x = origin + (i + 1/2) d, y = bottom + (j + 1/2) d, so that the knots of the quadratic
+B-splines, and with them the corners of the cells, fall on multiples of the spacing d. A flat ground, wall or upright
+barrier face on such a multiple is then met exactly by mirrored pairs of nodes. Corner (i, j) of the smoothing grid lies
+at x = origin + (i + 1) d, y = bottom + (j + 1) d: the upper right corner of the cell around node (i, j).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from ..effects import Effects
+
+BLOCK = 8
+"""Nodes along the side of a block, the unit in which the grid is switched on and off."""
+
+# Entries of the clock, a float64 array: the state of time, of the grid and of the barrier that lives on the device.
+TIME = 0
+TARGET = 1
+TIME_STEP = 2
+SPEED_MAX = 3
+GRID_SHIFT = 4
+"""Displacement of the grid (and of the barrier, with which it rides) since the start [m]."""
+BARRIER_VELOCITY = 5
+BARRIER_WORK = 6
+"""Work of the flow on the barrier [J/m]."""
+BASE_FRICTION_WORK = 7
+BASE_FRICTION_IMPULSE = 8
+"""Time integral of the friction force at the barrier's base, positive when it acts on the barrier downstream [N s/m]."""
+EXTERNAL_IMPULSE = 9
+EXTERNAL_FORCE = 10
+GRAVITY_IMPULSE_X = 11
+GRAVITY_IMPULSE_Y = 12
+ACTIVE_MASS_SOLID = 13
+ACTIVE_MASS_LIQUID = 14
+LARGEST_TIME_STEP = 15
+SMALLEST_TIME_STEP = 16
+DRIVEN_WORK = 17
+EXTERNAL_WORK = 18
+OLD_BARRIER_VELOCITY = 19
+BARRIER_IMPULSE_X = 20
+INITIAL_MASS_SOLID = 21
+INITIAL_MASS_LIQUID = 22
+CLOCK_SIZE = 23
+
+FASTEST = 1.0e5
+"""Speed [m/s] beyond which a run has diverged, whatever the scene."""
+
+# Counters, an int32 array.
+STEPS = 0
+DIVERGED = 1
+LIMIT_WAVE = 2
+LIMIT_DRAG = 3
+LIMIT_OUTPUT = 4
+BARRIER_ITERATIONS = 5
+BARRIER_UNCONVERGED = 6
+POINTS_LEFT = 7
+COUNTERS_SIZE = 8
+
+# Surfaces on which reactions are recorded: impulse on the surface in x and y, each a pair in one float64 array.
+FACE = 0
+TOP = 1
+BACK = 2
+GROUND = 3
+LEFT_WALL = 4
+RIGHT_WALL = 5
+SURFACES = 6
+
+# Ledger sums, a float64 array written by the ledger kernel.
+LEDGER_KINETIC = 0
+LEDGER_GRAVITATIONAL = 1
+LEDGER_ELASTIC = 2
+LEDGER_MOMENTUM_X = 3
+LEDGER_MOMENTUM_Y = 4
+LEDGER_PRESSURE_MAX = 5
+LEDGER_SOLID_MASS = 6
+LEDGER_LIQUID_MASS = 7
+LEDGER_SPEED_MAX = 8
+LEDGER_SIZE = 9
+
+# What left the domain, a float64 array.
+LEFT_SOLID_MASS = 0
+LEFT_LIQUID_MASS = 1
+LEFT_MOMENTUM_X = 2
+LEFT_MOMENTUM_Y = 3
+LEFT_ENERGY = 4
+LEFT_SIZE = 5
+
+
+def _structure(name: str, fields: dict[str, Any]) -> Any:
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+
+
+@cache
+def layout(effects: Effects) -> SimpleNamespace:
+    """Scalar, vector and structure types for `effects`.
+
+    `V` is the vector of all velocities at a place: (v_x, v_y) with one phase, (v_Sx, v_Sy, v_Lx, v_Ly) with two.
+    """
+    scalar = wp.float64 if effects.precision == "float64" else wp.float32
+    components = 4 if effects.two_phase else 2
+    V2 = wp.types.vector(2, scalar)
+    V3 = wp.types.vector(3, scalar)
+    V4 = wp.types.vector(4, scalar)
+    V = wp.types.vector(components, scalar)
+    # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
+    S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
+    array = wp.array
+
+    points: dict[str, Any] = {
+        "position": array(dtype=V2),
+        "velocity": array(dtype=V),
+        "stress": array(dtype=V4),
+        "reference_volume": array(dtype=scalar),
+        "volume": array(dtype=scalar),
+        "deviatoric_strain": array(dtype=scalar),
+        "gradient": array(dtype=V4),
+        "inside": array(dtype=wp.int32),
+    }
+    if effects.transfer == "flip":
+        points["advection"] = array(dtype=V2)
+    else:
+        points["affine_x"] = array(dtype=V)
+        points["affine_y"] = array(dtype=V)
+    if effects.plasticity:
+        points["solid_gap"] = array(dtype=scalar)
+    if effects.liquid:
+        points["liquid_strain"] = array(dtype=scalar)
+    if effects.pressure_relaxation:
+        points["pressure_residual"] = array(dtype=scalar)
+    if effects.two_phase:
+        points["liquid_divergence"] = array(dtype=scalar)
+
+    grid: dict[str, Any] = {
+        "mass": array(dtype=scalar, ndim=2),
+        "momentum": array(dtype=V, ndim=2),
+        "force": array(dtype=V, ndim=2),
+        "velocity": array(dtype=V, ndim=2),
+        "increment": array(dtype=V, ndim=2),
+        "block": array(dtype=wp.int32, ndim=2),
+    }
+    if effects.effective_contact_force:
+        grid["pore_force"] = array(dtype=V2, ndim=2)
+    if effects.smoothing_grid:
+        grid["corner"] = array(dtype=S, ndim=2)
+    if effects.gap_record and effects.smoothing_grid:
+        grid["corner_volume"] = array(dtype=scalar, ndim=2)  # part of a cell around each corner that is open to flow
+
+    parameters: dict[str, Any] = {
+        "spacing": scalar,
+        "inverse_spacing": scalar,
+        "left": scalar,
+        "bottom": scalar,
+        "columns": wp.int32,
+        "rows": wp.int32,
+        "gravity": V2,
+        "solid_density": scalar,  # per volume of mixture: (1 - n) rho_S; undrained: rho_m
+        "lame": scalar,
+        "shear_modulus": scalar,
+        "bulk_modulus": scalar,
+        "wave_speed": wp.float64,
+        "courant_number": wp.float64,
+        "largest_stable_step": wp.float64,
+        "pic_rate": scalar,
+    }
+    if effects.plasticity:
+        for name in ("sin_friction", "sin_dilatancy", "cohesion_term", "tension_limit"):
+            parameters[name] = scalar
+    if effects.liquid:
+        for name in (
+            "porosity",
+            "true_liquid_density",
+            "liquid_bulk_modulus",
+            "cavitation_pressure",
+            "relaxation_rate",
+        ):
+            parameters[name] = scalar
+    if effects.two_phase:
+        parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
+        parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
+        parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
+    if effects.ground != "none":
+        parameters["ground_row"] = wp.int32  # first row of nodes above the ground
+        parameters["ground_friction"] = scalar
+    if effects.side_walls:
+        parameters["left_wall"] = scalar  # position [m]; far outside the grid: open
+        parameters["right_wall"] = scalar
+    if effects.barrier == "sliding":
+        parameters["barrier_mass"] = wp.float64
+        parameters["barrier_weight"] = wp.float64
+        parameters["barrier_pull"] = wp.float64  # gravity's component along the ground, times the mass
+        parameters["base_friction"] = wp.float64
+
+    contact: dict[str, Any] = {
+        "node": array(dtype=wp.vec2i),
+        "mirror": array(dtype=wp.vec2i),  # (-1, -1): none
+        "normal": array(dtype=V2),
+        "surface": array(dtype=wp.int32),
+        "friction": array(dtype=scalar),
+        # Gathered each step, for the barrier's equation of motion.
+        "mass": array(dtype=scalar),
+        "velocity": array(dtype=V),
+        "liquid_free": array(dtype=V2),
+    }
+
+    return SimpleNamespace(
+        effects=effects,
+        scalar=scalar,
+        V2=V2,
+        V3=V3,
+        V4=V4,
+        V=V,
+        S=S,
+        components=components,
+        Points=_structure("Points", points),
+        Grid=_structure("Grid", grid),
+        Parameters=_structure("Parameters", parameters),
+        Contact=_structure("Contact", contact),
+        point_fields=points,
+        grid_fields=grid,
+        contact_fields=contact,
+    )

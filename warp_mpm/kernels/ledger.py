@@ -1,0 +1,79 @@
+"""Sums over the material points: masses, momentum, energies and extremes. Only launched when a sample is taken."""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+from .layout import (
+    LEDGER_ELASTIC,
+    LEDGER_GRAVITATIONAL,
+    LEDGER_KINETIC,
+    LEDGER_LIQUID_MASS,
+    LEDGER_MOMENTUM_X,
+    LEDGER_MOMENTUM_Y,
+    LEDGER_PRESSURE_MAX,
+    LEDGER_SOLID_MASS,
+    LEDGER_SPEED_MAX,
+)
+
+
+def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernel `ledger` (over points), which adds to an array emptied before."""
+    effects = types.effects
+    F = types.scalar
+    Points = types.Points
+    Parameters = types.Parameters
+    TWO_PHASE = effects.two_phase
+    LIQUID = effects.liquid
+
+    @wp.kernel(module=module)
+    def ledger(points: Points, parameters: Parameters, sums: wp.array(dtype=wp.float64)):
+        p = wp.tid()
+        if points.inside[p] == 0:
+            return
+        reference = points.reference_volume[p]
+        volume = points.volume[p]
+        v = points.velocity[p]
+        solid = reference * parameters.solid_density
+        speed = v[0] * v[0] + v[1] * v[1]
+        kinetic = solid * speed
+        mass = solid
+        momentum_x = solid * v[0]
+        momentum_y = solid * v[1]
+        if TWO_PHASE:
+            liquid = reference * parameters.liquid_density
+            liquid_speed = v[2] * v[2] + v[3] * v[3]
+            kinetic += liquid * liquid_speed
+            speed = wp.max(speed, liquid_speed)
+            mass += liquid
+            momentum_x += liquid * v[2]
+            momentum_y += liquid * v[3]
+            wp.atomic_add(sums, wp.static(LEDGER_LIQUID_MASS), wp.float64(liquid))
+        s = points.stress[p]
+        trace = s[0] + s[1] + s[2]
+        squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
+        deviatoric = squares - trace * trace / F(3.0)
+        elastic = volume * (
+            trace * trace / (F(18.0) * parameters.bulk_modulus) + deviatoric / (F(4.0) * parameters.shear_modulus)
+        )
+        if LIQUID:
+            pressure = wp.max(
+                -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
+            )
+            elastic += (
+                F(0.5) * volume * parameters.porosity * pressure * pressure / parameters.liquid_bulk_modulus
+            )
+            wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), wp.float64(pressure))
+        wp.atomic_add(sums, wp.static(LEDGER_KINETIC), wp.float64(F(0.5) * kinetic))
+        wp.atomic_add(
+            sums,
+            wp.static(LEDGER_GRAVITATIONAL),
+            -wp.float64(mass * wp.dot(parameters.gravity, points.position[p])),
+        )
+        wp.atomic_add(sums, wp.static(LEDGER_ELASTIC), wp.float64(elastic))
+        wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_X), wp.float64(momentum_x))
+        wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_Y), wp.float64(momentum_y))
+        wp.atomic_add(sums, wp.static(LEDGER_SOLID_MASS), wp.float64(solid))
+        wp.atomic_max(sums, wp.static(LEDGER_SPEED_MAX), wp.float64(speed))
+
+    return SimpleNamespace(ledger=ledger)

@@ -1,0 +1,136 @@
+"""Equation of motion of a barrier that slides on its base, solved together with the contact."""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+from .layout import (
+    BARRIER_ITERATIONS,
+    BARRIER_UNCONVERGED,
+    BARRIER_VELOCITY,
+    BASE_FRICTION_IMPULSE,
+    BASE_FRICTION_WORK,
+    EXTERNAL_FORCE,
+    EXTERNAL_IMPULSE,
+    EXTERNAL_WORK,
+    TIME_STEP,
+)
+
+MAX_ITERATIONS = 30
+
+
+def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernel `slide` (one thread): the barrier's velocity at the end of the step.
+
+    The flow's reaction depends on that velocity, so both are found together: a barrier far lighter than the flow is as
+    stable as a heavy one. With v the velocity sought, J(v) the flow's impulse on the barrier, W its weight,
+
+        m_2 (v - v_2) = J_x(v) + F_ext dt - sign(v) tan(delta_b) max(0, W dt - J_y(v)),
+
+    and v = 0 where friction can hold it. The unknown is bracketed and found by regula falsi (Illinois): the residual is
+    piecewise linear and increasing.
+    """
+    F = types.scalar
+    V2 = types.V2
+    Contact = types.Contact
+    Parameters = types.Parameters
+    respond = contact.respond
+    impulse = contact.impulse
+
+    @wp.func
+    def flow_impulse(
+        contact: Contact, count: wp.int32, velocity: wp.float64, parameters: Parameters, time_step: F
+    ) -> wp.vec2d:
+        total = wp.vec2d()
+        surface_velocity = V2(F(velocity), F(0.0))
+        for e in range(count):
+            mass = contact.mass[e]
+            if mass > F(0.0):
+                change = respond(
+                    mass,
+                    contact.velocity[e],
+                    contact.liquid_free[e],
+                    contact.normal[e],
+                    contact.friction[e],
+                    surface_velocity,
+                    parameters,
+                    time_step,
+                )
+                j = impulse(mass, change, parameters)
+                total += wp.vec2d(wp.float64(j[0]), wp.float64(j[1]))
+        return total
+
+    @wp.kernel(module=module)
+    def slide(
+        contact: Contact,
+        count: wp.int32,
+        parameters: Parameters,
+        clock: wp.array(dtype=wp.float64),
+        counters: wp.array(dtype=wp.int32),
+    ):
+        zero = wp.float64(0.0)
+        dt = clock[wp.static(TIME_STEP)]
+        time_step = F(dt)
+        old = clock[wp.static(BARRIER_VELOCITY)]
+        mass = parameters.barrier_mass
+        weight = parameters.barrier_weight * dt
+        external = (clock[wp.static(EXTERNAL_FORCE)] + parameters.barrier_pull) * dt
+        momentum = mass * old + external
+
+        j = flow_impulse(contact, count, zero, parameters, time_step)
+        drive = momentum + j[0]
+        friction = parameters.base_friction * wp.max(weight - j[1], zero)
+        new = zero
+        if wp.abs(drive) > friction:
+            sign = wp.sign(drive)
+            # At rest the drive wins over friction; a speed at which it no longer does is sought upward.
+            low = zero
+            low_residual = sign * drive - friction
+            high = low_residual / mass
+            high_residual = zero
+            bracketed = wp.bool(False)
+            iterations = wp.int32(0)
+            tolerance = wp.float64(1.0e-13) * (wp.abs(drive) + friction)
+            residual = low_residual
+            v = high
+            side = wp.int32(0)
+            while iterations < wp.static(MAX_ITERATIONS) and wp.abs(residual) > tolerance:
+                if bracketed:
+                    v = (low * high_residual - high * low_residual) / (high_residual - low_residual)
+                else:
+                    v = high
+                j = flow_impulse(contact, count, sign * v, parameters, time_step)
+                friction = parameters.base_friction * wp.max(weight - j[1], zero)
+                residual = sign * (momentum + j[0]) - friction - mass * v
+                if residual > zero:
+                    low = v
+                    low_residual = residual
+                    if not bracketed:
+                        high *= wp.float64(2.0)
+                    elif side == 1:
+                        high_residual *= wp.float64(0.5)
+                    side = wp.int32(1)
+                else:
+                    high = v
+                    high_residual = residual
+                    if bracketed and side == -1:
+                        low_residual *= wp.float64(0.5)
+                    bracketed = wp.bool(True)
+                    side = wp.int32(-1)
+                iterations += 1
+            new = sign * v
+            wp.atomic_add(counters, wp.static(BARRIER_ITERATIONS), iterations)
+            if wp.abs(residual) > tolerance * wp.float64(1.0e3):
+                wp.atomic_add(counters, wp.static(BARRIER_UNCONVERGED), 1)
+            # The momentum balance is closed exactly with the friction that is recorded.
+            friction = momentum + j[0] - mass * new
+        else:
+            friction = drive
+        clock[wp.static(BARRIER_VELOCITY)] = new
+        middle = wp.float64(0.5) * (old + new)
+        clock[wp.static(BASE_FRICTION_IMPULSE)] = clock[wp.static(BASE_FRICTION_IMPULSE)] - friction
+        clock[wp.static(BASE_FRICTION_WORK)] = clock[wp.static(BASE_FRICTION_WORK)] + friction * middle
+        clock[wp.static(EXTERNAL_IMPULSE)] = clock[wp.static(EXTERNAL_IMPULSE)] + external
+        clock[wp.static(EXTERNAL_WORK)] = clock[wp.static(EXTERNAL_WORK)] + external * middle
+
+    return SimpleNamespace(slide=slide)

@@ -1,0 +1,118 @@
+"""Critical time step: how fast waves run and how stiff the drag is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scenario import STANDARD_GRAVITY, Scenario, TwoPhaseFlow, UndrainedFlow
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """Bounds on the time step of a scene before the Courant number is applied."""
+
+    wave_speed: float
+    """Fastest wave through the material at rest [m/s]; the flow's own speed is added as the run goes."""
+    drag_step: float
+    """Largest stable step of explicitly integrated drag and waves together [s]; infinite where drag is implicit."""
+
+
+def undrained_wave_speed(oedometric_modulus: float, liquid_stiffness: float, density: float) -> float:
+    """Speed [m/s] with both phases moving together: sqrt((E_oed + K_L / n) / rho_m)."""
+    return math.sqrt((oedometric_modulus + liquid_stiffness) / density)
+
+
+def biot_wave_speeds(
+    oedometric_modulus: float, liquid_bulk_modulus: float, porosity: float, solid_density: float, liquid_density: float
+) -> tuple[float, float]:
+    """Fast and slow compression waves [m/s] of two phases without drag.
+
+    Eigenvalues of M^-1 K with M = diag(n_S rho_S, n rho_L) and
+    K = [[E_oed + n_S^2 K_L / n, n_S K_L], [n_S K_L, n K_L]].
+
+    Args:
+        oedometric_modulus: of the skeleton [Pa].
+        liquid_bulk_modulus: K_L [Pa].
+        porosity: n [-].
+        solid_density: of the grains [kg/m3].
+        liquid_density: of the liquid [kg/m3].
+    """
+    n, solid = porosity, 1.0 - porosity
+    coupling = solid * liquid_bulk_modulus
+    stiffness = np.array(
+        [[oedometric_modulus + solid * coupling / n, coupling], [coupling, n * liquid_bulk_modulus]]
+    )
+    mass = np.diag([solid * solid_density, n * liquid_density])
+    slow, fast = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real))
+    return float(fast), float(slow)
+
+
+def explicit_drag_step(
+    *,
+    spacing: float,
+    oedometric_modulus: float,
+    liquid_bulk_modulus: float,
+    porosity: float,
+    solid_density: float,
+    liquid_density: float,
+    conductivity: float,
+) -> float:
+    """Critical step [s] of the two-phase equations with explicit drag, which replaces Eq. (A13).
+
+    Largest step for which the explicit update of one linear element's highest mode is stable, after Mieremet: with
+    a the decay rate of v_L - v_S, and b and d the sum and product of the squared frequencies of the two modes,
+    dt = (-2 a + sqrt(4 a^2 + 8 B)) / B with B = b + sqrt(b^2 - 4 d).
+    """
+    n, solid = porosity, 1.0 - porosity
+    density = solid * solid_density + n * liquid_density
+    inertia = n * solid * solid_density * liquid_density
+    a = n * density * STANDARD_GRAVITY / (solid * solid_density * conductivity)
+    b = (
+        4.0
+        * (
+            n * density * liquid_bulk_modulus
+            + (1.0 - 2.0 * n) * liquid_density * liquid_bulk_modulus
+            + n * liquid_density * oedometric_modulus
+        )
+        / (inertia * spacing**2)
+    )
+    d = 16.0 * oedometric_modulus * liquid_bulk_modulus / (solid * solid_density * liquid_density * spacing**4)
+    both = b + math.sqrt(max(b * b - 4.0 * d, 0.0))
+    return (-2.0 * a + math.sqrt(4.0 * a * a + 8.0 * both)) / both
+
+
+def step_limits(scenario: Scenario) -> StepLimits:
+    """Bounds on the time step of `scenario` (audit, section 3.4)."""
+    flow = scenario.flow
+    if isinstance(flow, TwoPhaseFlow):
+        material = flow.material
+        fast, _ = biot_wave_speeds(
+            material.oedometric_modulus,
+            material.liquid_bulk_modulus_Pa,
+            material.porosity,
+            material.grain_density_kg_per_m3,
+            material.liquid_density_kg_per_m3,
+        )
+        drag = math.inf
+        if scenario.numerics.drag == "explicit":
+            drag = explicit_drag_step(
+                spacing=scenario.numerics.spacing_m,
+                oedometric_modulus=material.oedometric_modulus,
+                liquid_bulk_modulus=material.liquid_bulk_modulus_Pa,
+                porosity=material.porosity,
+                solid_density=material.grain_density_kg_per_m3,
+                liquid_density=material.liquid_density_kg_per_m3,
+                conductivity=material.hydraulic_conductivity,
+            )
+        return StepLimits(fast, drag)
+    if isinstance(flow, UndrainedFlow):
+        material_undrained = flow.material
+        stiffness = material_undrained.liquid_bulk_modulus_Pa / material_undrained.porosity
+        return StepLimits(
+            undrained_wave_speed(material_undrained.oedometric_modulus, stiffness, material_undrained.density),
+            math.inf,
+        )
+    return StepLimits(undrained_wave_speed(flow.material.oedometric_modulus, 0.0, flow.material.density), math.inf)
