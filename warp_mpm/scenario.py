@@ -494,16 +494,16 @@ class Numerics(_Model):
     """Material points in a full cell at t = 0."""
     courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.7
     """Share of the critical time step that is used, C_NB."""
-    transfer: Literal["flip", "apic"] = "flip"
-    """Velocity transfer between points and grid: flip (Sulsky et al. 1995, as the paper) or affine particle-in-cell."""
+    transfer: Literal["flip", "apic"] = "apic"
+    """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, as the paper)."""
     pic_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
-    """With flip: share of the grid's own velocity in the update, which damps noise."""
+    """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
     drag: Literal["semi_implicit", "explicit"] = "semi_implicit"
     """How the drag between the phases is integrated; explicit limits the time step at low conductivity."""
     volumetric_smoothing: bool = True
     """Volume strains are averaged over the grid, against volumetric locking."""
     pressure_relaxation: NonNegative = 1.0
-    """Rate at which point pressures are drawn to their grid average, in sound crossings of a cell [-]."""
+    """Rate at which the noise of point pressures about their grid average decays, per sound crossing of a cell [-]."""
     precision: Literal["float64", "float32"] = "float64"
     """Floating-point numbers of the simulation."""
 
