@@ -14,24 +14,20 @@ import numpy as np
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import Scenario, Trapezoid
 
-OVERTOPPED_SHARE = 0.05
-"""Least share of the flow beyond the crest's upstream edge that counts as overtopping."""
-
-JET_ENERGY_SHARE = 0.3
-"""Least kinetic energy of the material that passes the crest, over that of the arriving flow, of an airborne jet."""
+AIRBORNE_SHARE = 0.2
+"""Least share of the flow that is past the crest's edge and more than a flow depth above it, at one time, of a jet."""
 
 JUMP_DEPTH_RATIO = 1.5
-"""Least depth upstream of the barrier, over the flow's, that counts as a jump."""
+"""Least depth upstream of the barrier, over the flow's, that counts as a jump: h + v²/(2g) of a flow with Fr = 1."""
 
-JUMP_REACH = 1.0
-"""Distance from the barrier's toe, over the flow's depth, that a jump must have reached; nearer, it is a dead zone."""
+OVERTOPPED_SHARE = 0.05
+"""Least share of the flow beyond the crest that counts as overtopping."""
 
 RULE = (
-    f"airborne jet: at least {OVERTOPPED_SHARE:.0%} of the flow passed the crest's upstream edge, with at least "
-    f"{JET_ENERGY_SHARE:.0%} of the initial specific kinetic energy; otherwise, where a depth of {JUMP_DEPTH_RATIO:g} "
-    f"times the initial one was seen farther than {JUMP_REACH:g} depths upstream of the toe: standing jump if "
-    f"{OVERTOPPED_SHARE:.0%} passed the crest, bore if not; where it was not seen: dead zone; none: the flow did not "
-    "reach the barrier"
+    f"none: the flow did not reach the barrier; airborne jet: at one time at least {AIRBORNE_SHARE:.0%} of the flow "
+    "was past the crest's upstream edge and more than one flow depth above the crest; otherwise, where the depth "
+    f"upstream of the toe rose to {JUMP_DEPTH_RATIO:g} times the flow's or more, standing jump if at least "
+    f"{OVERTOPPED_SHARE:.0%} of the flow passed the crest, bore if not; otherwise dead zone"
 )
 """The criterion in words, for the summary."""
 
@@ -52,7 +48,7 @@ def deposit(scenario: Scenario, snapshot: Snapshot) -> dict[str, float | None]:
         "overtopped_volume": None,
     }
     if scenario.barrier is not None:
-        crest_start, crest_end = _crest(scenario)
+        crest_start, crest_end, _ = _crest(scenario)
         x = snapshot.position[:, 0] - (snapshot.barrier_displacement or 0.0)
         result["retained_volume"] = float(volume[x <= crest_start].sum())
         result["on_crest_volume"] = float(volume[(x > crest_start) & (x <= crest_end)].sum())
@@ -60,67 +56,66 @@ def deposit(scenario: Scenario, snapshot: Snapshot) -> dict[str, float | None]:
     return result
 
 
-def impact_mechanism(scenario: Scenario, snapshots: Iterable[Snapshot]) -> tuple[str | None, dict[str, float | None]]:
+def upstream_pore_pressure(scenario: Scenario, snapshot: Snapshot) -> float:
+    """Greatest pore pressure [Pa] upstream of the crest, or anywhere without a barrier; 0 for a dry flow.
+
+    The landing of a jet far downstream, harder than any impact on the barrier, is left out.
+    """
+    if "pore_pressure" not in snapshot:
+        return 0.0
+    pressure = snapshot["pore_pressure"]
+    if scenario.barrier is not None:
+        x = snapshot.position[:, 0] - (snapshot.barrier_displacement or 0.0)
+        pressure = pressure[x <= _crest(scenario)[0]]
+    return float(pressure.max(initial=0.0))
+
+
+def impact_mechanism(scenario: Scenario, snapshots: Iterable[Snapshot]) -> tuple[str | None, dict[str, float]]:
     """Name of the mechanism (`RULE`) and the measures it rests on; no name without a barrier.
 
-    Measures: `overtopped_share` [-], the most of the flow that was beyond the crest's upstream edge at one time;
-    `overtopping_energy_share` [-]; `jump_depth_ratio` [-], the greatest depth upstream of the toe over the initial one;
-    `jump_reach` [m], the farthest upstream that the jump's depth was seen; `run_up` [m], the highest point reached
-    upstream of the crest.
+    Measures: `airborne_share` [-] and `overtopped_share` [-], as in the rule; `jump_depth_ratio` [-], the greatest
+    depth upstream of the toe over the flow's; `run_up` [m], the greatest height of material upstream of the crest.
     """
     if scenario.barrier is None:
         return None, {}
-    depth, density = scenario.flow.depth, scenario.flow.material.solid_partial_density
-    crest_start, crest_end = _crest(scenario)
+    depth = scenario.flow.depth
+    whole = scenario.flow.volume * scenario.flow.material.solid_partial_density
+    crest_start, crest_end, crest_height = _crest(scenario)
     bin_width = max(2.0 * scenario.numerics.spacing_m, 0.25 * depth)
-    share, energy, passed = 0.0, 0.0, 0.0
-    depth_ratio, reach, run_up, touched = 0.0, 0.0, 0.0, False
+    airborne, overtopped, jump, run_up, touched = 0.0, 0.0, 0.0, 0.0, False
     for snapshot in snapshots:
-        mass = snapshot["solid_mass"]
+        share = snapshot["solid_mass"] / whole
         x = snapshot.position[:, 0] - (snapshot.barrier_displacement or 0.0)
         y = snapshot.position[:, 1]
-        velocity = snapshot["solid_velocity"]
         touched = touched or bool((x > -0.5 * scenario.numerics.spacing_m).any())
-        share = max(share, float(mass[x > crest_start].sum()) / (density * scenario.flow.volume))
-        # Weighted with the flux through the crest, so that a slow pool on it does not count for more than a fast jet.
-        crossing = (x > crest_start) & (x <= crest_end) & (velocity[:, 0] > 0.0)
-        flux = mass[crossing] * velocity[crossing, 0]
-        energy += float(flux @ (0.5 * (velocity[crossing] ** 2).sum(axis=1)))
-        passed += float(flux.sum())
+        airborne = max(airborne, float(share[(x > crest_start) & (y > crest_height + depth)].sum()))
+        overtopped = max(overtopped, float(share[x > crest_end].sum()))
         upstream = x < 0.0
         if upstream.any():
             column = np.floor(-x[upstream] / bin_width).astype(np.int64)
-            local = np.bincount(column, weights=mass[upstream] / density) / bin_width / depth
-            depth_ratio = max(depth_ratio, float(local.max()))
-            thick = np.flatnonzero(local >= JUMP_DEPTH_RATIO)
-            if len(thick) > 0:
-                reach = max(reach, float(thick[-1] + 1) * bin_width)
-        before_crest = x <= crest_start
-        if before_crest.any():
-            run_up = max(run_up, float(y[before_crest].max()))
-    arriving = 0.5 * scenario.flow.speed**2
-    energy_share = energy / passed / arriving if passed > 0.0 and arriving > 0.0 else 0.0
-    measures: dict[str, float | None] = {
-        "overtopped_share": share,
-        "overtopping_energy_share": energy_share if passed > 0.0 else None,
-        "jump_depth_ratio": depth_ratio,
-        "jump_reach": reach,
+            area = np.bincount(column, weights=share[upstream]) * scenario.flow.volume
+            jump = max(jump, float(area.max()) / bin_width / depth)
+        run_up = max(run_up, float(y[x <= crest_start].max(initial=0.0)))
+    measures = {
+        "airborne_share": airborne,
+        "overtopped_share": overtopped,
+        "jump_depth_ratio": jump,
         "run_up": run_up,
     }
-    overtopped = share >= OVERTOPPED_SHARE
     if not touched:
         return "none", measures
-    if overtopped and energy_share >= JET_ENERGY_SHARE:
+    if airborne >= AIRBORNE_SHARE:
         return "airborne jet", measures
-    if reach > JUMP_REACH * depth:
-        return ("standing jump" if overtopped else "bore"), measures
+    if jump >= JUMP_DEPTH_RATIO:
+        return ("standing jump" if overtopped >= OVERTOPPED_SHARE else "bore"), measures
     return "dead zone", measures
 
 
-def _crest(scenario: Scenario) -> tuple[float, float]:
-    """x of the crest's two ends [m] before the barrier moves; a wall without end has no crest to pass."""
+def _crest(scenario: Scenario) -> tuple[float, float, float]:
+    """x of the crest's two ends and its height [m] before the barrier moves; a wall without end has no crest."""
     assert scenario.barrier is not None
     shape: Any = scenario.barrier.shape
     if isinstance(shape, Trapezoid):
-        return float(shape.polygon[1, 0]), float(shape.polygon[2, 0])
-    return np.inf, np.inf
+        start, end = shape.polygon[1], shape.polygon[2]
+        return float(start[0]), float(end[0]), float(end[1])
+    return np.inf, np.inf, np.inf

@@ -117,11 +117,13 @@ def pore_pressure(results: Results, times: Sequence[float] = PRESSURE_TIMES) -> 
     wet = "pore_pressure" in frames[0]
     shown = [_shown(frame, wet) for frame in frames]
     # A few points of a jet that lands must not take the whole scale for themselves.
-    top = max(float(np.quantile(values, 0.998)) if len(values) else 0.0 for values in shown) or 1.0
+    top = max(float(np.quantile(values, 0.99)) if len(values) else 0.0 for values in shown) or 1.0
 
     left, right, bottom, high = _window(scenario, frames)
-    width = 9.0
-    panel_height = max(0.78 * width * (high - bottom) / (right - left), 0.8)
+    # Panels as wide as a page, but no taller than a third of one; the rest of the width is labels and scale.
+    aspect = (right - left) / (high - bottom)
+    panel_height = min(max(7.0 / aspect, 0.6), 3.2)
+    width = min(max(panel_height * aspect, 4.0), 7.0) + 2.0
     figure = Figure(figsize=(width, (panel_height + 0.35) * len(frames) + 0.8), layout="compressed")
     axes = np.atleast_1d(figure.subplots(len(frames), 1, sharex=True))
     figure.suptitle(scenario.title, fontsize=11)

@@ -42,7 +42,14 @@ def test_run_fills_the_default_folder_and_tells_the_figures(command):
     assert results.record["scenario_file"] == SET_IIB
     peak = results.summary["peak_force"]
     assert f"{peak / 1e3:,.1f} kN/m" in result.stdout
-    for words in ("Set IIb", "peak force", "impulse", "mechanism seen", "wall time", "Results are in runs/set_iib"):
+    for words in (
+        "Set IIb",
+        "peak force",
+        "volume [m³/m]",
+        "mechanism seen",
+        "wall time",
+        "Results are in runs/set_iib",
+    ):
         assert words in result.stdout
     # In a pipe: a line when it begins to run, one for every tenth, and no control characters.
     assert result.stdout.count("of 1 s   ") == 11
