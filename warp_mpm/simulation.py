@@ -16,7 +16,7 @@ from .effects import Effects
 from .grid import contact_nodes, fit_grid, open_corner_volumes
 from .kernels import layout as at
 from .kernels.build import build_kernels
-from .scenario import STANDARD_GRAVITY, DryFlow, Fixed, Prescribed, Scenario, Sliding, TwoPhaseFlow
+from .scenario import STANDARD_GRAVITY, DryFlow, Fixed, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
 from .time_step import step_limits
 
 wp.config.log_level = wp.LOG_WARNING
@@ -129,6 +129,9 @@ class Simulation:
             values["true_liquid_density"] = liquid.liquid_density_kg_per_m3
             values["liquid_bulk_modulus"] = liquid.liquid_bulk_modulus_Pa
             values["cavitation_pressure"] = liquid.cavitation_pressure_Pa
+            if scenario.barrier is not None:
+                shape = scenario.barrier.shape
+                values["crest_end"] = shape.polygon[2, 0] if isinstance(shape, Trapezoid) else 0.0
             values["relaxation_rate"] = numerics.pressure_relaxation * speed_per_cell
         if effects.two_phase:
             two: Any = material
@@ -389,7 +392,7 @@ class Simulation:
         Keys without the effect they belong to are absent.
         """
         self._sums.zero_()
-        self._launch("ledger", self.material_points, self._points, self._parameters, self._sums)
+        self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
         sums = self._sums.numpy()
         totals = self._totals()
         clock, reactions = totals.clock, totals.reactions
@@ -440,7 +443,10 @@ class Simulation:
             "solid_mass": sums[at.LEDGER_SOLID_MASS],
         }
         if self.effects.liquid:
-            values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MAX]
+            values["pore_pressure_max_anywhere"] = sums[at.LEDGER_PRESSURE_MAX]
+            # What loads the barrier: where a jet lands behind it, single points meet the ground at water-hammer pressure.
+            upstream = at.LEDGER_PRESSURE_UPSTREAM if self.effects.barrier != "none" else at.LEDGER_PRESSURE_MAX
+            values["pore_pressure_max"] = sums[upstream]
         if self.effects.two_phase:
             values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
         values |= {

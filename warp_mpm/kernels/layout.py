@@ -81,7 +81,8 @@ LEDGER_PRESSURE_MAX = 5
 LEDGER_SOLID_MASS = 6
 LEDGER_LIQUID_MASS = 7
 LEDGER_SPEED_MAX = 8
-LEDGER_SIZE = 9
+LEDGER_PRESSURE_UPSTREAM = 9
+LEDGER_SIZE = 10
 
 # What left the domain, a float64 array.
 LEFT_SOLID_MASS = 0
@@ -180,6 +181,8 @@ def layout(effects: Effects) -> SimpleNamespace:
             "relaxation_rate",
         ):
             parameters[name] = scalar
+    if effects.liquid and effects.barrier != "none":
+        parameters["crest_end"] = wp.float64  # x of the crest's downstream corner at t = 0
     if effects.two_phase:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S

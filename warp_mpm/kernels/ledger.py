@@ -11,7 +11,9 @@ from .layout import (
     LEDGER_LIQUID_MASS,
     LEDGER_MOMENTUM_X,
     LEDGER_MOMENTUM_Y,
+    GRID_SHIFT,
     LEDGER_PRESSURE_MAX,
+    LEDGER_PRESSURE_UPSTREAM,
     LEDGER_SOLID_MASS,
     LEDGER_SPEED_MAX,
 )
@@ -25,9 +27,12 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
+    BARRIER = effects.barrier != "none"
 
     @wp.kernel(module=module)
-    def ledger(points: Points, parameters: Parameters, sums: wp.array(dtype=wp.float64)):
+    def ledger(
+        points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64), sums: wp.array(dtype=wp.float64)
+    ):
         p = wp.tid()
         if points.inside[p] == 0:
             return
@@ -64,6 +69,9 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 F(0.5) * volume * parameters.porosity * pressure * pressure / parameters.liquid_bulk_modulus
             )
             wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), wp.float64(pressure))
+            if BARRIER:
+                if wp.float64(points.position[p][0]) < parameters.crest_end + clock[wp.static(GRID_SHIFT)]:
+                    wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_UPSTREAM), wp.float64(pressure))
         wp.atomic_add(sums, wp.static(LEDGER_KINETIC), wp.float64(F(0.5) * kinetic))
         wp.atomic_add(
             sums,
