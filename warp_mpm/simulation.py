@@ -88,6 +88,8 @@ class Simulation:
         self._make_clock()
         self._graph: Any = None
         self._last = self._totals()
+        mass = self._initial.solid_mass.sum() + self._initial.liquid_mass.sum()
+        self._initial_momentum = mass * np.array(scenario.flow.velocity_m_per_s)
 
     # -- construction ------------------------------------------------------------------------------------------
 
@@ -314,6 +316,40 @@ class Simulation:
                 "a number. Try a smaller numerics.courant_number or a finer numerics.spacing_m."
             )
 
+    def set_points(self, **state: NDArray[np.float64]) -> None:
+        """Replace part of the initial state; only before the first step.
+
+        Args:
+            state: any of `solid_velocity`, `liquid_velocity` [N, 2] m/s (the latter with two phases only),
+                `effective_stress` [N, 4] Pa (xx, yy, zz, xy, tension positive) and `pore_pressure` [N] Pa
+                (compression positive), in the order of `points()`.
+
+        Raises:
+            ValueError: the run has begun, or a field is unknown here, of another shape or not finite.
+        """
+        if self.steps > 0:
+            raise ValueError("set_points changes the initial state; this simulation has made steps already")
+        now = self.points()
+        allowed = {"solid_velocity", "liquid_velocity", "effective_stress", "pore_pressure"} & set(now)
+        for name, values in state.items():
+            if name not in allowed:
+                raise ValueError(f"set_points knows no {name} in this scene; it can set {', '.join(sorted(allowed))}")
+            if np.shape(values) != now[name].shape or not np.isfinite(values).all():
+                raise ValueError(f"set_points needs finite {name} of shape {now[name].shape}, not {np.shape(values)}")
+        now |= state
+        velocity, solid, liquid = now["solid_velocity"], now["solid_mass"], now["liquid_mass"]
+        self._initial_momentum = (solid + liquid) @ velocity
+        if self.effects.two_phase:
+            self._initial_momentum = solid @ velocity + liquid @ now["liquid_velocity"]
+            velocity = np.concatenate([velocity, now["liquid_velocity"]], axis=1)
+        self._point_arrays["velocity"].assign(velocity)
+        self._point_arrays["stress"].assign(now["effective_stress"])
+        if self.effects.liquid:
+            self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)
+        clock = self._clock.numpy()
+        clock[at.SPEED_MAX] = (velocity**2).sum(axis=1).max()
+        self._clock.assign(clock)
+
     # -- state -------------------------------------------------------------------------------------------------
 
     def _clock_entry(self, entry: int) -> float:
@@ -462,11 +498,6 @@ class Simulation:
         }
         self._last = totals
         return {name: float(value) for name, value in values.items()}
-
-    @property
-    def _initial_momentum(self) -> NDArray[np.float64]:
-        mass = self._initial.solid_mass.sum() + self._initial.liquid_mass.sum()
-        return mass * np.array(self.scenario.flow.velocity_m_per_s)
 
     @property
     def record(self) -> dict[str, Any]:
