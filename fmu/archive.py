@@ -21,7 +21,9 @@ from importlib import metadata
 from pathlib import Path
 
 from fmu import documentation
+from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface
+from fmu.units.worker_process import RECORD
 
 PROJECT = "warp-mpm-impact"
 _HERE = Path(__file__).parent
@@ -34,7 +36,7 @@ _WRAPPER_FAULTS = {
     # pythonfmu 0.7.0, linux64: when the process exits, a function that runs after the destructors releases the
     # wrapper's state a second time, which corrupts the host's memory ("corrupted double-linked list"). The destructor
     # does the same work, so the function is made to return at once. Place of its first instruction after the marker.
-    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (0x2f7e4, b"\x55", b"\xc3"),
+    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (0x2F7E4, b"\x55", b"\xc3"),
 }
 """By the SHA-256 of a wrapper: offset in the file, the byte that stands there, and the byte to put there."""
 
@@ -72,10 +74,12 @@ class PythonUnit:
         return importlib.import_module(f"fmu.units.{self.module}").INTERFACE
 
 
+DEFAULT_SCENARIO = _ROOT / "scenarios" / "set_iib.json"
+
 PYTHON_UNITS = (
     PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", ("sliding.py",), needs_impact=True),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
-    # PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+    PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
 )
 
 
@@ -90,7 +94,7 @@ def project_version() -> str:
 
 
 def build_python_unit(
-    unit: PythonUnit, folder: Path, *, version: str | None = None, resources: Mapping[str, bytes] | None = None
+    unit: PythonUnit, folder: Path, *, version: str | None = None, scenario: Path | None = None
 ) -> Path:
     """Build ``folder/<name>.fmu``.
 
@@ -99,7 +103,7 @@ def build_python_unit(
     unit: which one.
     folder: created if missing; an archive of the same name in it is replaced.
     version: instead of the project's version.
-    resources: further files for the archive's ``resources`` folder, by name.
+    scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
 
     Raises
     ------
@@ -123,7 +127,8 @@ def build_python_unit(
         with zipfile.ZipFile(stage / f"{unit.name}.fmu") as plain:
             entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
         entries = {name: _mended(data) for name, data in _own_pythonfmu(entries, package).items()}
-        entries |= {f"resources/{name}": data for name, data in (resources or {}).items()}
+        if unit.name == "DebrisFlow":
+            entries |= _simulator_resources(scenario or DEFAULT_SCENARIO)
         entries |= documentation.entries(unit.interface, version)
         return write_archive(folder / f"{unit.name}.fmu", entries)
 
@@ -167,6 +172,16 @@ def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
     if result.returncode:
         last = (result.stderr.strip().splitlines() or [f"exit code {result.returncode}"])[-1]
         raise BuildError(f"pythonfmu could not build {package}: {last}")
+
+
+def _simulator_resources(scenario: Path) -> dict[str, bytes]:
+    """The scenario that runs unless the importer names another, and which Python has the simulator."""
+    record = {"interpreter": sys.executable, "import_path": [str(_ROOT)]}
+    return {
+        f"resources/{SCENARIO}": scenario.read_bytes(),
+        f"resources/{RECORD}": json.dumps(record, indent=2).encode(),
+        "resources/requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
+    }
 
 
 def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, bytes]:

@@ -275,7 +275,7 @@ class UnitSlave(Fmi2Slave):
             "time": self.time,
             "stale": self.stale,
             "values": list(self.values),
-            "snapshot": self.snapshot() if self.life in (STEPPING, FAILED) else None,
+            "snapshot": self.snapshot() if self.life == STEPPING else None,
         }
 
     @guarded

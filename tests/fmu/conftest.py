@@ -102,3 +102,9 @@ def open_unit(archives: dict[str, Path], unzipped: dict[str, Path]) -> Iterator[
     yield opener
     for host in hosts:
         host.fmu.fmi2FreeInstance(host.fmu.component)
+
+
+@pytest.fixture
+def host_class() -> type[Host]:
+    """For tests that free their instance themselves."""
+    return Host

@@ -1,0 +1,193 @@
+"""The worker of a DebrisFlow unit: runs the simulation in the user's own Python and answers requests over its pipes."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+from fmu.units.worker_process import PROTOCOL
+
+PARENT_CHECK_INTERVAL = 1.0
+"""Time between looks at whether the host is still there [s], for hosts whose end does not close the pipe."""
+
+WARM_UP_TIME = 1e-9
+"""Simulated time [s] of the step that compiles the kernels; it is undone."""
+
+
+class RefusedRequestError(Exception):
+    """A request that cannot be met; the message is one sentence for the importer."""
+
+
+class Worker:
+    """The simulation behind one instance of a unit, and the states that its importer keeps."""
+
+    def __init__(self) -> None:
+        self.simulation: Any = None
+        self.scenario: Any = None
+        self.states: dict[int, bytes] = {}
+        self.last_key = 0
+        self.barrier_velocity: float | None = None
+        self.external_force = 0.0
+
+    def open(self, *, scenario: str, device: str, spacing: float | None, driven: bool) -> dict[str, Any]:
+        from warp_mpm import Scenario, Simulation
+
+        self.scenario = Scenario.load(Path(scenario))
+        changes: dict[str, Any] = {}
+        if spacing is not None:
+            changes["numerics.spacing_m"] = spacing
+        if driven:
+            if self.scenario.barrier is None:
+                raise RefusedRequestError("barrier_motion is 2 (driven), but the scenario has no barrier.")
+            changes["barrier.motion"] = {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [0.0]}
+        if changes:
+            self.scenario = self.scenario.replaced(changes)
+        self.simulation = Simulation(self.scenario, device=device)
+        beginning = self.simulation.save_state()
+        self.simulation.advance(until=WARM_UP_TIME)
+        self.simulation.restore_state(beginning)
+        return {}
+
+    def step(self, *, until: float, barrier_velocity: float | None, external_force: float) -> dict[str, Any]:
+        if barrier_velocity is not None and barrier_velocity != self.barrier_velocity:
+            self.simulation.set_barrier_velocity(barrier_velocity)
+            self.barrier_velocity = barrier_velocity
+        if external_force != self.external_force:
+            if self.scenario.barrier is None or self.scenario.barrier.motion.kind != "sliding":
+                raise RefusedRequestError(
+                    f"external_force is {external_force:g} N/m, it must be 0 N/m unless the barrier slides."
+                )
+            self.simulation.set_external_force(external_force)
+            self.external_force = external_force
+        if until > self.simulation.time:
+            self.simulation.advance(until=until)
+        return self.sample()
+
+    def sample(self) -> dict[str, Any]:
+        values = self.simulation.sample()
+        surfaces = ("impact_force", "top_force", "back_force")
+        return {
+            "impact_force_x": values.get("impact_force_x", 0.0),
+            "impact_force_y": values.get("impact_force_y", 0.0),
+            "top_force": values.get("top_force_x", 0.0),
+            "barrier_force": sum(values.get(f"{surface}_x", 0.0) for surface in surfaces),
+            "vertical_load": 0.0 - sum(values.get(f"{surface}_y", 0.0) for surface in surfaces),
+            "barrier_velocity": values.get("barrier_velocity", 0.0),
+            "barrier_displacement": values.get("barrier_displacement", 0.0),
+            "pore_pressure_max": values.get("pore_pressure_max", 0.0),
+            "flow_kinetic_energy": values["flow_kinetic_energy"],
+            "overtopped_volume": self._overtopped_volume(),
+        }
+
+    def _overtopped_volume(self) -> float:
+        from warp_mpm.mechanism import deposit
+
+        if self.scenario.barrier is None:
+            return 0.0
+        return deposit(self.scenario, _Present(self.simulation))["overtopped_volume"] or 0.0  # type: ignore[arg-type]
+
+    def save_state(self) -> dict[str, Any]:
+        self.last_key += 1
+        self.states[self.last_key] = self._state()
+        return {"key": self.last_key}
+
+    def restore_state(self, *, key: int) -> dict[str, Any]:
+        self._restore(self.states[key])
+        return {}
+
+    def drop_state(self, *, key: int) -> dict[str, Any]:
+        self.states.pop(key, None)
+        return {}
+
+    def export_state(self, *, key: int) -> dict[str, Any]:
+        return {"data": base64.b64encode(self.states[key]).decode()}
+
+    def import_state(self, *, data: str) -> dict[str, Any]:
+        self._restore(base64.b64decode(data))
+        return {}
+
+    def _state(self) -> bytes:
+        inputs = json.dumps([self.barrier_velocity, self.external_force]).encode()
+        return inputs + b"\n" + self.simulation.save_state()
+
+    def _restore(self, state: bytes) -> None:
+        inputs, _, simulation_state = state.partition(b"\n")
+        self.simulation.restore_state(simulation_state)
+        self.barrier_velocity, self.external_force = json.loads(inputs)
+
+
+class _Present:
+    """The simulation's present state in the shape of a snapshot."""
+
+    def __init__(self, simulation: Any) -> None:
+        self._points = simulation.points()
+        self.position = self._points["position"]
+        self.barrier_displacement = simulation.barrier_displacement
+
+    def __getitem__(self, name: str) -> Any:
+        return self._points[name]
+
+
+def main() -> None:
+    """Answer requests until the input ends."""
+    # Results go to a pipe of their own: whatever a library prints must not get between the answers.
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the host's to handle; the input ends with it
+    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_read_requests, args=(sys.stdin.buffer, requests), daemon=True).start()
+    threading.Thread(target=_watch_parent, daemon=True).start()
+    _send(answers, {"protocol": PROTOCOL})
+    worker = Worker()
+    while True:
+        request = json.loads(requests.get())
+        _send(answers, answer(getattr(worker, request.pop("request")), request))
+
+
+def answer(method: Callable[..., dict[str, Any]], arguments: dict[str, Any]) -> dict[str, Any]:
+    """What a request comes to: its results, or one sentence of what is wrong."""
+    try:
+        return method(**arguments)
+    except (RefusedRequestError, ValueError, RuntimeError) as error:
+        return {"error": " ".join(str(error).split())}
+    except Exception as error:
+        import traceback
+
+        traceback.print_exc()
+        return {"error": f"{type(error).__name__}: {error}"}
+
+
+def _send(answers: IO[str], message: dict[str, Any]) -> None:
+    answers.write(json.dumps(message) + "\n")
+    answers.flush()
+
+
+def _read_requests(pipe: IO[bytes], requests: queue.SimpleQueue[bytes]) -> None:
+    with contextlib.suppress(OSError, ValueError):
+        for line in pipe:
+            requests.put(line)
+    # The host has closed the pipe or has gone. A step may be under way in the main thread: end it too.
+    os._exit(0)
+
+
+def _watch_parent() -> None:
+    parent = os.getppid()
+    while True:
+        time.sleep(PARENT_CHECK_INTERVAL)
+        if sys.platform != "win32" and os.getppid() != parent:
+            os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
