@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import json
+import math
 import os
 import queue
 import signal
@@ -75,6 +76,9 @@ class Worker:
 
     def sample(self) -> dict[str, Any]:
         values = self.simulation.sample()
+        wrong = [name for name, value in values.items() if not math.isfinite(value)]
+        if wrong:
+            raise RefusedRequestError(f"The simulation gave {values[wrong[0]]} for {wrong[0]}.")
         surfaces = ("impact_force", "top_force", "back_force")
         return {
             "impact_force_x": values.get("impact_force_x", 0.0),

@@ -57,6 +57,8 @@ class WorkerProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
+                # Without buffers: a buffer's lock, held by a thread that the host's exit has frozen, aborts the host.
+                bufsize=0,
                 env=environment,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
@@ -86,10 +88,10 @@ class WorkerProcess:
         """
         if self._process is None or self._process.stdin is None:
             raise UnitError("The simulator's process has ended.")
-        line = json.dumps({"request": request, **arguments}) + "\n"
+        line = memoryview((json.dumps({"request": request, **arguments}) + "\n").encode())
         try:
-            self._process.stdin.write(line.encode())
-            self._process.stdin.flush()
+            while line:
+                line = line[self._process.stdin.write(line) :]
         except OSError:
             raise UnitError(self._obituary(request)) from None
         return self._answer(request, time_limit)
@@ -179,11 +181,14 @@ def find_interpreter(resources: str) -> tuple[str, list[str]]:
 
 
 def _read_lines(pipe: IO[bytes], answers: queue.SimpleQueue[bytes | None]) -> None:
-    try:
-        for line in pipe:
-            answers.put(line)
-    except (OSError, ValueError):
-        pass  # closed under way
+    parts: list[bytes] = []
+    with contextlib.suppress(OSError, ValueError):  # the pipe may be closed under way
+        while chunk := pipe.read(1 << 16):
+            *lines, rest = chunk.split(b"\n")
+            for line in lines:
+                answers.put(b"".join([*parts, line]))
+                parts = []
+            parts.append(rest)
     answers.put(_END)
 
 

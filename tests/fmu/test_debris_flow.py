@@ -385,16 +385,19 @@ def test_prints_do_not_get_between_the_answers(tmp_path: Path) -> None:
     worker.close()
 
 
-def test_diverged_simulation_is_reported(tmp_path: Path) -> None:
-    """Velocities that are no numbers, put into the real simulation in its real worker."""
+@pytest.mark.parametrize(("velocity", "says"), [("1e6", "diverged at t ="), ("nan", "gave nan for")])
+def test_failed_computation_is_reported(velocity: str, says: str, tmp_path: Path) -> None:
+    """Velocities out of all sense, put into the real simulation in its real worker."""
     resources = fake_worker(
         tmp_path,
         _REAL_WORKER
-        + """
+        + f"""
         plain_step = worker.Worker.step
 
+        from math import nan
+
         def poisoned_step(self, **arguments):
-            self.simulation._point_arrays["velocity"].fill_(float("nan"))
+            self.simulation._point_arrays["velocity"].fill_({velocity})
             return plain_step(self, **arguments)
 
         worker.Worker.step = poisoned_step
@@ -408,7 +411,7 @@ def test_diverged_simulation_is_reported(tmp_path: Path) -> None:
     slave.exit_initialization_mode()
     assert slave["flow_kinetic_energy"] > 0.0
     assert not slave.do_step(0.0, 0.1)
-    assert "diverged at t =" in slave["message"]
+    assert says in slave["message"]
     assert math.isnan(slave["impact_force_x"])
     assert not slave.do_step(0.1, 0.1)
     slave.terminate()
