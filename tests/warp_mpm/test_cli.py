@@ -56,6 +56,13 @@ def test_run_fills_the_default_folder_and_tells_the_figures(command):
     assert "\x1b" not in result.stdout
 
 
+def test_brackets_in_a_title_are_only_brackets(command):
+    Path("scene.json").write_text(json.dumps({**json.loads(Path(SET_IIB).read_text()), "title": "[bold]a[/] [/x]"}))
+    result = command("run", "scene.json", "--spacing", "0.5", "--until", "0.5")
+    assert result.exit_code == 0
+    assert "[bold]a[/] [/x]" in result.stdout
+
+
 def test_quiet_run_says_nothing(command):
     result = run(command, "--quiet", "--out", "here")
     assert (result.exit_code, result.output) == (0, "")

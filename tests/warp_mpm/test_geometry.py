@@ -59,6 +59,9 @@ def test_crossing_edges():
     bow = SQUARE[[0, 2, 1, 3]]
     assert geometry.crossing_edges(bow) is not None
     assert geometry.crossing_edges(COMB) is None
+    # The first side, drawn on, would cross the fourth, which its bounding box meets; it stops short of it.
+    short = np.array([[0.0, 0.0], [3.0, 3.0], [1.0, 3.2], [2.0, 4.0], [6.0, 2.9], [6.0, 0.0]])
+    assert geometry.crossing_edges(short) is None
     touching = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, 0.0], [0.0, 2.0]])
     assert geometry.crossing_edges(touching) is not None
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from warp_mpm.scenario import Fixed, Scenario, json_schema
 from warp_mpm.scenario_errors import ScenarioError
@@ -301,6 +303,45 @@ def test_missing_file(tmp_path):
 
 def test_editor_pointer_is_accepted(case_1):
     assert Scenario.model_validate({"$schema": "scenario.schema.json", **case_1.resolved()}) == case_1
+
+
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.floats(), max_size=4),
+    st.lists(st.lists(st.floats(-30, 30), min_size=2, max_size=2), max_size=7),
+    st.dictionaries(st.sampled_from(["kind", "formulation", "x"]), st.sampled_from(["dry", "wall", "sliding", 3])),
+)
+
+
+def places(data, path=()):
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+        yield (*path, key)
+        if isinstance(value, (dict, list)):
+            yield from places(value, (*path, key))
+
+
+@settings(max_examples=300, deadline=None)
+@given(name=st.sampled_from(NAMES), changes=st.lists(st.tuples(st.integers(0, 10**6), JUNK), min_size=1, max_size=3))
+def test_whatever_a_file_holds_it_is_a_scene_or_one_clear_error(name, changes):
+    data = scene(name).resolved()
+    for number, junk in changes:
+        *parents, leaf = list(places(data))[number % len(list(places(data)))]
+        place = data
+        for key in parents:
+            place = place[key]
+        place[leaf] = junk
+    scenario, problems = None, []
+    try:
+        scenario = Scenario.model_validate(data)
+    except ScenarioError as error:
+        problems = error.problems
+    assert (scenario is None) == bool(problems)
+    assert all(problem and "\n" not in problem and problem[-1] in ".?" for problem in problems)
+    assert scenario is None or Scenario.model_validate(scenario.resolved()) == scenario
 
 
 def test_scenario_cannot_be_changed(case_1):
