@@ -129,8 +129,7 @@ def lightest_barrier(scene: Scene, limit: float, bounds: Bounds, rule: Rule = la
 
 
 def _lightest_at(angle: float, scene: Scene, limit: float, bounds: Bounds, rule: Rule) -> Design | None:
-    run = 0.0 if angle == 90 else bounds.height / math.tan(math.radians(angle))  # horizontal length of the face
-    narrowest = bounds.density * bounds.height * (bounds.crest_width + run)
+    narrowest = bounds.density * bounds.height * (bounds.crest_width + _run(angle, bounds))
 
     def moved(mass: float) -> tuple[float, Coefficients]:
         trial = replace(scene, barrier_mass=mass, face_angle=angle, barrier_height=bounds.height)
@@ -145,17 +144,32 @@ def _lightest_at(angle: float, scene: Scene, limit: float, bounds: Bounds, rule:
         low, high = (low, middle) if moved(middle)[0] <= limit else (middle, high)
     mass = max(high, narrowest)
     distance, coefficients = moved(mass)
-    mean_width = mass / (bounds.density * bounds.height)
-    return Design(
-        base_width=mean_width + run,
-        crest_width=mean_width - run,
-        height=bounds.height,
-        face_angle=angle,
-        mass=mass,
-        displacement=distance,
-        governed_by="displacement" if high >= narrowest else "shape",
-        coefficients=coefficients,
-    )
+    governed_by = "displacement" if high >= narrowest else "shape"
+    return Design(*_shape(mass, angle, bounds), mass, distance, governed_by, coefficients)
+
+
+def _shape(mass: float, angle: float, bounds: Bounds) -> tuple[float, float, float, float]:
+    """B, b, H [m] and beta [degrees] of a trapezoid."""
+    mean_width, run = mass / (bounds.density * bounds.height), _run(angle, bounds)
+    return mean_width + run, mean_width - run, bounds.height, angle
+
+
+def _run(angle: float, bounds: Bounds) -> float:
+    """Horizontal length of the face [m]."""
+    return 0.0 if angle == 90 else bounds.height / math.tan(math.radians(angle))
+
+
+def trapezoid(mass: float, bounds: Bounds) -> tuple[float, float, float, float]:
+    """B, b, H [m] and beta [degrees] of a barrier of the mass ``mass`` [kg/m], with the flattest face that is possible.
+
+    Where no shape within ``bounds`` is so light, the lightest one, which is heavier.
+    """
+    low, high = bounds.face_angle
+    spare = mass / (bounds.density * bounds.height) - bounds.crest_width  # room for the face's horizontal length
+    steepest_needed = math.degrees(math.atan2(bounds.height, spare)) if spare > 0 else 90.0
+    angle = min(max(low, steepest_needed), high)
+    narrowest = bounds.density * bounds.height * (bounds.crest_width + _run(angle, bounds))
+    return _shape(max(mass, narrowest), angle, bounds)
 
 
 def chart(scene: Scene, mass_ratio: Array, speed: Array, rule: Rule = lambda scene: Coefficients()) -> Array:

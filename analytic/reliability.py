@@ -14,6 +14,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import qmc, rankdata
 
 from analytic.arrays import outcomes
+from analytic.design import MASS_RATIOS
 from analytic.impact import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -142,6 +143,8 @@ class Reliability:
     """Mean displacement [m]."""
     quantiles: Mapping[float, float]
     """Displacement [m] at the probabilities 0.05, 0.5, 0.95, 0.99."""
+    curve: Array
+    """Probabilities from 0 to 0.999 and the displacements [m] at them [2, 1000]."""
     sensitivity: Mapping[str, Sensitivity]
     """By input, the one that matters most first."""
 
@@ -181,35 +184,86 @@ def reliability(
     ValueError: an input is unknown, missing or out of its range, or nothing is uncertain.
     """
     fixed, uncertain = _sorted(inputs)
-    if not (math.isfinite(limit) and limit >= 0):
-        raise ValueError(f"limit is {limit:g}, it must be a number in [0, inf).")
-    if samples < 1000:
-        raise ValueError(f"samples is {samples}, it must be at least 1000.")
-    draw = np.random.default_rng(seed)
+    uniform = _uniform(limit, samples, len(uncertain), seed)
 
-    def displacement(uniform: Array) -> Array:
-        values = dict(fixed)
-        for column, (name, distribution) in enumerate(uncertain.items()):
-            values[name] = distribution.quantile(uniform[:, column], *INPUTS[name])
-        values["flow_mass"] = values.pop("density") * values["flow_length"] * values.pop("flow_height")
-        found = outcomes(**values, variant=variant, gravity=gravity).barrier_displacement_final
-        return np.broadcast_to(found, uniform.shape[:1])
+    def displacement(points: Array) -> Array:
+        return _displacement(_values(fixed, uncertain, points), len(points), variant, gravity)
 
-    # Strictly inside (0, 1): the quantiles at the ends are infinite.
-    uniform = np.clip(draw.random((samples, len(uncertain))), 1e-12, 1 - 1e-12)
     moved = displacement(uniform)
-    if not np.all(np.isfinite(moved)):
-        raise ValueError("base_friction must be above 0, without it a barrier that slides never stops.")
     exceeding = int(np.count_nonzero(moved > limit))
     levels = (0.05, 0.5, 0.95, 0.99)
+    probabilities = np.arange(1000) / 1000
     return Reliability(
         samples=samples,
         probability=exceeding / samples,
         interval=_wilson(exceeding, samples),
         mean=float(moved.mean()),
         quantiles=dict(zip(levels, map(float, np.quantile(moved, levels)), strict=True)),
+        curve=np.array([probabilities, np.quantile(moved, probabilities)]),
         sensitivity=_sensitivity(displacement, list(uncertain), uniform, moved, seed),
     )
+
+
+def lightest_mass(
+    inputs: Mapping[str, float | Distribution],
+    limit: float,
+    probability: float,
+    *,
+    samples: int = 1_000_000,
+    seed: int = 1,
+    variant: str = "stick_slip",
+    gravity: float = STANDARD_GRAVITY,
+) -> float:
+    """Least barrier mass [kg/m] that slides beyond ``limit`` [m] with at most the given probability.
+
+    The same samples serve every trial mass. ``inputs``: as in ``reliability``; a ``barrier_mass`` there is not used.
+
+    Raises
+    ------
+    ValueError: as ``reliability``; the probability is not in (0, 1); or no mass is enough.
+    """
+    if not 0 < probability < 1:
+        raise ValueError(f"probability is {probability:g}, it must be a number in (0, 1).")
+    fixed, uncertain = _sorted({**inputs, "barrier_mass": 1.0})
+    values = _values(fixed, uncertain, _uniform(limit, samples, len(uncertain), seed))
+    typical = float(np.median(values["flow_mass"]))
+
+    def share(mass: float) -> float:
+        values["barrier_mass"] = mass
+        return float(np.mean(_displacement(values, samples, variant, gravity) > limit))
+
+    low, high = MASS_RATIOS[0] * typical, MASS_RATIOS[1] * typical
+    if share(high) > probability:
+        raise ValueError(f"No barrier up to {MASS_RATIOS[1]:g} times the flow's mass keeps {limit:g} m so surely.")
+    while high > low * (1 + 1e-4):  # bisection: the share falls as the mass grows
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if share(middle) <= probability else (middle, high)
+    return high
+
+
+def _uniform(limit: float, samples: int, count: int, seed: int) -> Array:
+    """Random points in the open unit cube, at whose faces quantiles are infinite."""
+    if not (math.isfinite(limit) and limit >= 0):
+        raise ValueError(f"limit is {limit:g}, it must be a number in [0, inf).")
+    if samples < 1000:
+        raise ValueError(f"samples is {samples}, it must be at least 1000.")
+    return np.clip(np.random.default_rng(seed).random((samples, count)), 1e-12, 1 - 1e-12)
+
+
+def _values(fixed: Mapping[str, Any], uncertain: Mapping[str, Distribution], points: Array) -> dict[str, Any]:
+    """Inputs of ``outcomes`` at points of the unit cube."""
+    values = dict(fixed)
+    for column, (name, distribution) in enumerate(uncertain.items()):
+        values[name] = distribution.quantile(points[:, column], *INPUTS[name])
+    values["flow_mass"] = values.pop("density") * values["flow_length"] * values.pop("flow_height")
+    return values
+
+
+def _displacement(values: Mapping[str, Any], count: int, variant: str, gravity: float) -> Array:
+    found = outcomes(**values, variant=variant, gravity=gravity).barrier_displacement_final
+    if not np.all(np.isfinite(found)):
+        raise ValueError("base_friction must be above 0, without it a barrier that slides never stops.")
+    return np.broadcast_to(found, (count,))
 
 
 def _sorted(inputs: Mapping[str, float | Distribution]) -> tuple[dict[str, Any], dict[str, Distribution]]:

@@ -1,0 +1,134 @@
+"""`python -m analytic compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from analytic.cli.calibrate import load
+from analytic.cli.predict import make_impact, option
+from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.impact import VARIANTS
+from analytic.scene import ASSUMED_RISE_RATIO, Scene, read_scene
+
+COLUMNS = {
+    "peak_force": ("F_peak [kN/m]", 1e-3),
+    "rise_time": ("T1 [s]", 1.0),
+    "duration": ("T2 [s]", 1.0),
+    "impulse": ("J [kN s/m]", 1e-3),
+    "flow_kinetic_energy_at_peak": ("E_k1(T1) [kJ/m]", 1e-3),
+    "barrier_kinetic_energy_max": ("E_k2,max [kJ/m]", 1e-3),
+    "barrier_velocity_max": ("v2,max [m/s]", 1.0),
+    "barrier_displacement_final": ("Δx_f [m]", 1.0),
+}
+"""Figures that are compared, with the unit of the table and its factor from SI."""
+
+SIMULATED = "simulated"
+
+
+def compare(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(metavar="PATH...", help="Run folders of the simulator, or scenario files.", show_default=False),
+    ],
+    variant: Annotated[
+        list[str] | None,
+        typer.Option(help=f"Variant to show, of {', '.join(VARIANTS)}; may be repeated.", show_default="all"),
+    ] = None,
+    geometry_change: Annotated[
+        float | None, option("--lambda", "--geometry-change", help="λ [-]. The paper's: 0.72 fixed, 0.41 sliding.")
+    ] = None,
+    rise_ratio: Annotated[float, typer.Option("--tau", "--rise-ratio", help="τ [-].")] = ASSUMED_RISE_RATIO,
+    reference_speed: Annotated[
+        float | None, option("--reference-speed", help="Speed [m/s] for which λ and τ hold; scales them (§3.2).")
+    ] = None,
+    filter_window: Annotated[float, typer.Option(help="Length of the force's moving mean [s].")] = 0.05,
+    as_json: AsJson = False,
+    plot: Plot = None,
+) -> None:
+    """Hold the closed form, without fitting it, against simulations; or its variants against each other.
+
+    In brackets: the difference from the simulated value. For one scenario, also what the pressure formulas say of
+    the same flow on a fixed barrier.
+    """
+    with refusals():
+        check_plot(plot)
+        for name in variant or ():
+            if name not in VARIANTS:
+                raise ValueError(f"variant is {name!r}, it must be one of {', '.join(VARIANTS)}.")
+        model: dict[str, Any] = {"rise_ratio": rise_ratio}
+        if geometry_change is not None:
+            model["geometry_change"] = geometry_change
+        scenes: dict[str, Scene] = {}
+        found: dict[str, dict[str, Any]] = {}
+        for path in paths:
+            name = path.stem if path.is_file() else path.name or str(path)
+            found[name], scenes[name] = _figures(path, variant or list(VARIANTS), model, reference_speed, filter_window)
+        if as_json:
+            print_json({name: {source: vars(f) for source, f in rows.items()} for name, rows in found.items()})
+        else:
+            _print(found, scenes)
+        if plot is not None:
+            write_plot(lambda: _figure(found, scenes), plot)
+
+
+def _figures(
+    path: Path, variants: list[str], model: dict[str, Any], reference_speed: float | None, filter_window: float
+) -> tuple[dict[str, Any], Scene]:
+    """Key figures by source, and the scene, of a run folder or a scenario file."""
+    from analytic.calibration import key_figures, measure, measured_key_figures
+
+    rows: dict[str, Any] = {}
+    if path.is_dir():
+        _, series, scene = load(path, None)
+        measured = measure(series["time"], series["impact_force_x"], filter_window)
+        rows[SIMULATED] = measured_key_figures(series, measured)
+    else:
+        scene = read_scene(path)
+    for name in variants if not scene.fixed else variants[:1]:  # fixed, the variants are one and the same
+        rows[name] = key_figures(make_impact(scene, model | {"variant": name}, reference_speed))
+    return rows, scene
+
+
+def _print(found: dict[str, dict[str, Any]], scenes: dict[str, Scene]) -> None:
+    rows = []
+    for name, sources in found.items():
+        reference = sources.get(SIMULATED)
+        for source, figures in sources.items():
+            cells = [_cell(figures, reference, column, factor) for column, (_, factor) in COLUMNS.items()]
+            rows.append([name if source == next(iter(sources)) else "", source, *cells])
+    remarks = [f"{name}: {remark}" for name, scene in scenes.items() for remark in scene.remarks]
+    print_table("Impact", ["scene", "source", *(label for label, _ in COLUMNS.values())], rows, remarks)
+    if len(scenes) == 1 and SIMULATED not in next(iter(found.values())):
+        _print_pressures(next(iter(scenes.values())))
+
+
+def _cell(figures: Any, reference: Any, column: str, factor: float) -> str:
+    value = getattr(figures, column)
+    text = number(None if value is None else value * factor)
+    base = None if reference is None else getattr(reference, column)
+    if figures is reference or not base or value is None:
+        return text
+    return f"{text} ({100 * (value / base - 1):+.0f} %)"
+
+
+def _print_pressures(scene: Scene) -> None:
+    from analytic.empirical import select
+
+    rows = []
+    for model in select():
+        pressure = float(model.pressure(scene.density, scene.speed, scene.flow_height, scene.gravity))
+        over = pressure / (scene.density * scene.speed**2)
+        rows.append([model.title, number(pressure / 1e3), number(over), model.confidence.value])
+    title = f"Peak pressure of the same flow on a fixed barrier, Fr = {scene.froude_number:.2f}"
+    print_table(title, ["model", "p [kPa]", "p / (ρ v²)", "confidence"], rows)
+
+
+def _figure(found: dict[str, dict[str, Any]], scenes: dict[str, Scene]) -> Any:
+    from analytic import plots
+
+    sliding = any(not scene.fixed for scene in scenes.values())
+    kind = "sliding barriers" if sliding else "fixed barriers"
+    return plots.comparison(f"Simulated and closed-form impact, {kind}", found, sliding)

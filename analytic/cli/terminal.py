@@ -1,0 +1,88 @@
+"""Tables for a person, JSON for a program, and one sentence for a mistake."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+BAD_INPUT = 2
+"""Exit code of an input that cannot be used."""
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI units per metre of width.")]
+Plot = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a png, pdf or svg file.")
+]
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Turn a ValueError, which all bad inputs raise, into its sentence and the exit code 2."""
+    try:
+        yield
+    except ValueError as error:
+        typer.echo(f"Error: {error}", err=True)
+        raise typer.Exit(BAD_INPUT) from None
+
+
+def print_json(content: Any) -> None:
+    """Print JSON; what is infinite or not a number becomes null, which JSON has no other word for."""
+    typer.echo(json.dumps(_finite(content), indent=2, ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> None:
+    """Print a table with its first column to the left, the others to the right, and notes under it."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 200  # a file has no edge to fit to
+    table = Table(box=box.SIMPLE_HEAD)
+    for index, name in enumerate(header):
+        table.add_column(name, justify="left" if index == 0 else "right")
+    for row in rows:
+        table.add_row(*row)
+    console.print(title, style="bold", soft_wrap=True)
+    console.print(table)
+    for note in notes:
+        console.print(note, soft_wrap=True)
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number for a table; a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "never" if value > 0 else "-∞"
+    return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+
+
+def write_plot(make: Any, path: Path) -> None:
+    """Draw ``make()`` into ``path`` and say so."""
+    from analytic import plots
+
+    plots.save(make(), path)
+    typer.echo(f"Figure: {path}", err=True)
+
+
+def check_plot(path: Path | None) -> None:
+    """Refuse a picture file that cannot be written before anything is computed."""
+    if path is not None:
+        from analytic import plots
+
+        plots.check_path(path)
