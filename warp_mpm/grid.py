@@ -12,7 +12,8 @@ from .kernels.layout import BACK, BLOCK, FACE, TOP
 from .scenario import Barrier, Scenario, Trapezoid
 
 MARGIN = 4
-"""Columns and rows of nodes around the region that material may reach."""
+"""Columns and rows of nodes around the region that material may reach; the first row above a ground is row 4 of the
+first row of blocks, which holds all that the ground concerns."""
 
 LARGEST_GRID = 2_000_000
 """Most nodes that a grid fitted to the scene gets; beyond, the fitted edges move in and what leaves is counted."""

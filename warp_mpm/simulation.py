@@ -81,6 +81,8 @@ class Simulation:
         self._types = self._kernels.types
         self.grid = fit_grid(scenario)
         self._limits = step_limits(scenario)
+        # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
+        self._workers = 1 if self.device.is_cpu else 65536
         self._parameters = self._make_parameters()
         self._make_points()
         self._make_grid()
@@ -108,6 +110,8 @@ class Simulation:
             "bottom": self.grid.bottom,
             "columns": self.grid.columns,
             "rows": self.grid.rows,
+            "block_rows": self.grid.rows // at.BLOCK,
+            "workers": self._workers,
             "gravity": self._types.V2(*scenario.gravity.vector),
             "solid_density": material.density if effects.formulation == "undrained" else material.solid_partial_density,
             "lame": lame,
@@ -201,15 +205,16 @@ class Simulation:
 
     def _make_grid(self) -> None:
         types = self._types
-        shape = (self.grid.columns, self.grid.rows)
-        self._blocks = (self.grid.columns // at.BLOCK, self.grid.rows // at.BLOCK)
+        blocks = (self.grid.columns // at.BLOCK, self.grid.rows // at.BLOCK)
+        shapes = {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1}
         self._grid = types.Grid()
         self._grid_arrays = {}
         for name in types.grid_fields:
-            if name == "corner_volume":
-                array = self._array(open_corner_volumes(self.scenario, self.grid), types.scalar)
+            if name == "corner_room":
+                array = self._array(1.0 / open_corner_volumes(self.scenario, self.grid), types.scalar)
             else:
-                array = self._empty(types.grid_fields, name, self._blocks if name == "block" else shape)
+                shape = shapes.get(name, (self.grid.columns, self.grid.rows))
+                array = self._empty(types.grid_fields, name, shape)
             setattr(self._grid, name, array)
             self._grid_arrays[name] = array
 
@@ -269,11 +274,12 @@ class Simulation:
             self.effects, self._grid, self._points, self._parameters, self._clock,
         )
         count = self.material_points
-        self._launch("clear", self._blocks, grid)
+        self._launch("clear", self._workers, grid, parameters)
+        self._launch("forget", 1, grid)
         self._launch("scatter", count, points, grid, parameters, clock)
-        self._launch("move", self._blocks, grid, parameters, clock)
+        self._launch("move", self._workers, grid, parameters, clock)
         if effects.ground != "none":
-            self._launch("ground", self.grid.columns, grid, parameters, clock, self._reactions)
+            self._launch("ground", self._workers, grid, parameters, clock, self._reactions)
         if effects.side_walls:
             self._launch("side_walls", self.grid.rows, grid, parameters, clock, self._reactions)
         if effects.barrier != "none":

@@ -33,6 +33,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     kernels = SimpleNamespace(
         types=types,
         clear=transfer.clear,
+        forget=transfer.forget,
         scatter=transfer.scatter,
         move=momentum.move,
         gather=transfer.gather,

@@ -92,6 +92,11 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             )
         return trial, opening, deviatoric
 
+    @wp.func
+    def room(filling: F) -> F:
+        """Largest volume strain of a gap [-]: it cannot exceed what the points around leave free."""
+        return -wp.log(wp.clamp(filling, F(1.0e-12), F(1.0)))
+
     @wp.kernel(module=module)
     def update(
         points: Points,
@@ -131,7 +136,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                     corner = grid.corner[i, j]
                     h = hx[k] * hy[m]
                     if GAP_BOUND:
-                        filling += h * corner[0] / grid.corner_volume[i, j]
+                        filling += h * corner[0] * grid.corner_room[i, j]
                     h = h / wp.max(corner[0], F(1.0e-30))
                     smooth += h * corner[1]
                     if TWO_PHASE:
@@ -144,11 +149,6 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                 liquid_divergence = smooth_liquid
 
         volume_strain = divergence * time_step
-        room = F(0.0)
-        if GAP_BOUND:
-            # A gap cannot be larger than the room that the points around leave.
-            if filling < F(1.0):
-                room = -wp.log(wp.max(filling, F(1.0e-12)))
         borne = volume_strain
         if PLASTICITY:
             # A skeleton that has opened bears nothing until the gap has closed.
@@ -161,7 +161,8 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             points.stress[p] = stress
             gap += opening
             if GAP_BOUND:
-                gap = wp.min(gap, room)
+                if gap > F(0.0):
+                    gap = wp.min(gap, room(filling))
             points.solid_gap[p] = gap
             points.deviatoric_strain[p] += deviatoric
             points.volume[p] = points.volume[p] * (F(1.0) + borne - opening)
@@ -194,7 +195,8 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                         strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
                     )
             if GAP_BOUND:
-                strain = wp.min(strain, room / parameters.porosity)
+                if strain > F(0.0):
+                    strain = wp.min(strain, room(filling) / parameters.porosity)
             points.liquid_strain[p] = strain
 
         if FLIP:

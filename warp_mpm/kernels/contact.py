@@ -14,6 +14,7 @@ import warp as wp
 
 from .layout import (
     BARRIER_VELOCITY,
+    BLOCK,
     GRID_SHIFT,
     GROUND,
     LEFT_WALL,
@@ -23,7 +24,7 @@ from .layout import (
 
 
 def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build those of the kernels `ground` (over columns), `side_walls` (over rows), `collect` and `barrier` (over
+    """Build those of the kernels `ground` (workers on the blocks in use), `side_walls` (over rows), `collect` and `barrier` (over
     contacts) that are called for, and the functions `respond` and `impulse` for the barrier's equation of motion."""
     effects = types.effects
     F = types.scalar
@@ -50,11 +51,8 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             free = free_velocity(grid, parameters, i, j, time_step)
             result = V2(free[2], free[3])
         elif PORE_FORCE:
-            inverse = F(1.0) / grid.mass[i, j]
             result = (
-                grid.momentum[i, j] * inverse
-                + grid.pore_force[i, j] * (time_step * inverse / parameters.true_liquid_density)
-                + parameters.gravity * time_step
+                free_velocity(grid, parameters, i, j, time_step) + grid.liquid_surplus[i, j] / grid.mass[i, j]
             )
         return result
 
@@ -182,13 +180,25 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
         def ground(
             grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
         ):
-            i = wp.tid()
+            worker = wp.tid()
             time_step = F(clock[wp.static(TIME_STEP)])
             row = parameters.ground_row
             up = V2(F(0.0), F(1.0))
             friction = parameters.ground_friction
-            fixed_surface(grid, parameters, i, row - 1, i, row, up, friction, time_step, wp.static(GROUND), reactions)
-            fixed_surface(grid, parameters, i, row - 2, i, row - 2, up, friction, time_step, wp.static(GROUND), reactions)
+            # The three rows that the ground concerns lie in one row of blocks.
+            for s in range(worker, grid.active_count[0], parameters.workers):
+                block = grid.active[s]
+                bi = block / parameters.block_rows
+                if block == bi * parameters.block_rows + row / wp.static(BLOCK):
+                    for a in range(wp.static(BLOCK)):
+                        i = bi * wp.static(BLOCK) + a
+                        fixed_surface(
+                            grid, parameters, i, row - 1, i, row, up, friction, time_step, wp.static(GROUND), reactions
+                        )
+                        fixed_surface(
+                            grid, parameters, i, row - 2, i, row - 2, up, friction, time_step, wp.static(GROUND),
+                            reactions,
+                        )
 
         kernels["ground"] = ground
 

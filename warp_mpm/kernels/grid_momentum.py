@@ -8,87 +8,67 @@ from .layout import BLOCK, TIME_STEP
 
 
 def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernel `move` (over blocks) and the function `free_velocity` (before contact and drag)."""
+    """Build the kernel `move` (workers on the blocks in use) and the function `free_velocity` (before contact and
+    implicit drag)."""
     effects = types.effects
     F = types.scalar
-    V2 = types.V2
     V = types.V
-    S = types.S
     Grid = types.Grid
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     FLIP = effects.transfer == "flip"
-    CORNERS = effects.smoothing_grid
 
     @wp.func
     def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:
         """Velocities at the end of the step under internal forces and gravity alone."""
         inverse = F(1.0) / grid.mass[i, j]
-        momentum = grid.momentum[i, j]
-        force = grid.force[i, j]
-        g = parameters.gravity
-        solid = time_step * inverse / parameters.solid_density
-        result = V()
-        if TWO_PHASE:
-            liquid = time_step * inverse / parameters.liquid_density
-            result = V(
-                momentum[0] * inverse + force[0] * solid + g[0] * time_step,
-                momentum[1] * inverse + force[1] * solid + g[1] * time_step,
-                momentum[2] * inverse + force[2] * liquid + g[0] * time_step,
-                momentum[3] * inverse + force[3] * liquid + g[1] * time_step,
-            )
-        else:
-            result = V(
-                momentum[0] * inverse + force[0] * solid + g[0] * time_step,
-                momentum[1] * inverse + force[1] * solid + g[1] * time_step,
-            )
+        result = grid.momentum[i, j] * inverse
+        if FLIP:
+            force = grid.force[i, j]
+            g = parameters.gravity
+            solid = inverse / parameters.solid_density
+            if TWO_PHASE:
+                liquid = inverse / parameters.liquid_density
+                result += time_step * V(
+                    force[0] * solid + g[0], force[1] * solid + g[1], force[2] * liquid + g[0], force[3] * liquid + g[1]
+                )
+            else:
+                result += time_step * V(force[0] * solid + g[0], force[1] * solid + g[1])
         return result
 
     @wp.func
-    def dragged(free: V, old: V, parameters: Parameters, time_step: F) -> V:
-        """Exchange momentum between the phases. Per node and direction the two unknowns decouple into the mixture's
-        velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate Q (1/n_S rho_S + 1/n rho_L)."""
+    def dragged(free: V, parameters: Parameters, time_step: F) -> V:
+        """Exchange momentum between the phases, implicitly. Per node and direction the two unknowns decouple into the
+        mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
+        Q (1 / n_S rho_S + 1 / n rho_L)."""
         total = parameters.solid_density + parameters.liquid_density
         solid_share = parameters.solid_density / total
         liquid_share = parameters.liquid_density / total
-        mixture = V2(
-            solid_share * free[0] + liquid_share * free[2], solid_share * free[1] + liquid_share * free[3]
-        )
-        w = V2(free[2] - free[0], free[3] - free[1])
-        rate = parameters.drag_rate * time_step
-        if IMPLICIT_DRAG:
-            w = w / (F(1.0) + rate)
-        else:
-            w -= rate * V2(old[2] - old[0], old[3] - old[1])
-        return V(
-            mixture[0] - liquid_share * w[0],
-            mixture[1] - liquid_share * w[1],
-            mixture[0] + solid_share * w[0],
-            mixture[1] + solid_share * w[1],
-        )
+        lost = parameters.drag_rate * time_step / (F(1.0) + parameters.drag_rate * time_step)
+        x = lost * (free[2] - free[0])
+        y = lost * (free[3] - free[1])
+        return free + V(liquid_share * x, liquid_share * y, -solid_share * x, -solid_share * y)
 
     @wp.kernel(module=module)
     def move(grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """Velocity and velocity increment of every node in use; empties the corners for this step's gather."""
-        bi, bj = wp.tid()
-        mark = grid.block[bi, bj]
-        if mark > 0:
-            time_step = F(clock[wp.static(TIME_STEP)])
-            for a in range(wp.static(BLOCK)):
-                for b in range(wp.static(BLOCK)):
-                    i = bi * wp.static(BLOCK) + a
-                    j = bj * wp.static(BLOCK) + b
-                    if CORNERS:
-                        grid.corner[i, j] = S()
-                    mass = grid.mass[i, j]
-                    if mass > F(0.0):
-                        old = grid.momentum[i, j] / mass
-                        new = free_velocity(grid, parameters, i, j, time_step)
-                        if TWO_PHASE:
-                            new = dragged(new, old, parameters, time_step)
-                        grid.velocity[i, j] = new
-                        if FLIP:
-                            grid.increment[i, j] = new - old
+        """Velocity (with FLIP: and its increment) of every node in use."""
+        worker = wp.tid()
+        time_step = F(clock[wp.static(TIME_STEP)])
+        for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+            block = grid.active[s / wp.static(BLOCK)]
+            bi = block / parameters.block_rows
+            bj = block - bi * parameters.block_rows
+            i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            for b in range(wp.static(BLOCK)):
+                j = bj * wp.static(BLOCK) + b
+                mass = grid.mass[i, j]
+                if mass > F(0.0):
+                    new = free_velocity(grid, parameters, i, j, time_step)
+                    if IMPLICIT_DRAG:
+                        new = dragged(new, parameters, time_step)
+                    grid.velocity[i, j] = new
+                    if FLIP:
+                        grid.increment[i, j] = new - grid.momentum[i, j] / mass
 
     return SimpleNamespace(move=move, free_velocity=free_velocity)

@@ -140,17 +140,20 @@ def layout(effects: Effects) -> SimpleNamespace:
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),
         "momentum": array(dtype=V, ndim=2),
-        "force": array(dtype=V, ndim=2),
         "velocity": array(dtype=V, ndim=2),
-        "increment": array(dtype=V, ndim=2),
         "block": array(dtype=wp.int32, ndim=2),
+        "active": array(dtype=wp.int32),
+        "active_count": array(dtype=wp.int32),
     }
+    if effects.transfer == "flip":
+        grid["force"] = array(dtype=V, ndim=2)
+        grid["increment"] = array(dtype=V, ndim=2)
     if effects.effective_contact_force:
-        grid["pore_force"] = array(dtype=V2, ndim=2)
+        grid["liquid_surplus"] = array(dtype=V2, ndim=2)  # momentum that the liquid alone would have gained beyond
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.gap_record and effects.smoothing_grid:
-        grid["corner_volume"] = array(dtype=scalar, ndim=2)  # part of a cell around each corner that is open to flow
+        grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
 
     parameters: dict[str, Any] = {
         "spacing": scalar,
@@ -159,6 +162,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "bottom": scalar,
         "columns": wp.int32,
         "rows": wp.int32,
+        "block_rows": wp.int32,
+        "workers": wp.int32,  # threads that share the blocks in use
         "gravity": V2,
         "solid_density": scalar,  # per volume of mixture: (1 - n) rho_S; undrained: rho_m
         "lame": scalar,

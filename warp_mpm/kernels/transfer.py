@@ -13,7 +13,7 @@ from .layout import (
 
 
 def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernels `clear` (over blocks), `scatter` and `gather` (over points)."""
+    """Build the kernels `clear` (workers on the blocks in use), `forget`, `scatter` and `gather` (over points)."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2
@@ -36,25 +36,56 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
     PORE_FORCE = effects.effective_contact_force
-    DRAG_RATE = effects.two_phase
+    EXPLICIT_DRAG = effects.drag == "explicit"
 
     @wp.kernel(module=module)
-    def clear(grid: Grid):
-        """Empty the nodes of every block that was in use. A block's mark is 2 when points touched it this step, 1 when
-        they did in the step before (its corners are still to be emptied), 0 when it is not in use."""
-        bi, bj = wp.tid()
-        mark = grid.block[bi, bj]
-        if mark > 0:
-            grid.block[bi, bj] = mark - 1
-            for a in range(wp.static(BLOCK)):
-                for b in range(wp.static(BLOCK)):
-                    i = bi * wp.static(BLOCK) + a
-                    j = bj * wp.static(BLOCK) + b
-                    grid.mass[i, j] = F(0.0)
-                    grid.momentum[i, j] = V()
+    def clear(grid: Grid, parameters: Parameters):
+        """Empty the nodes of the blocks that were in use. A block's mark is its place in the list of active blocks,
+        counted from one; zero when it is not in use."""
+        worker = wp.tid()
+        for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+            block = grid.active[s / wp.static(BLOCK)]
+            bi = block / parameters.block_rows
+            bj = block - bi * parameters.block_rows
+            i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            grid.block[bi, bj] = 0
+            for b in range(wp.static(BLOCK)):
+                j = bj * wp.static(BLOCK) + b
+                grid.mass[i, j] = F(0.0)
+                grid.momentum[i, j] = V()
+                if FLIP:
                     grid.force[i, j] = V()
-                    if PORE_FORCE:
-                        grid.pore_force[i, j] = V2()
+                if PORE_FORCE:
+                    grid.liquid_surplus[i, j] = V2()
+                if CORNERS:
+                    grid.corner[i, j] = S()
+
+    @wp.kernel(module=module)
+    def forget(grid: Grid):
+        """Forget the list of active blocks, once they are empty."""
+        grid.active_count[0] = 0
+
+    @wp.func
+    def mark(grid: Grid, parameters: Parameters, bi: wp.int32, bj: wp.int32):
+        if grid.block[bi, bj] == 0:
+            if wp.atomic_cas(grid.block, bi, bj, 0, 1) == 0:
+                place = wp.atomic_add(grid.active_count, 0, 1)
+                grid.active[place] = bi * parameters.block_rows + bj
+
+    # Referenced, and so compiled, only with explicit drag.
+    @wp.func
+    def exchange(v: V, parameters: Parameters) -> V:
+        """Explicit drag: force on each phase per volume of mixture."""
+        x = parameters.drag_coefficient * (v[2] - v[0])
+        y = parameters.drag_coefficient * (v[3] - v[1])
+        return V(x, y, -x, -y)
+
+    @wp.func
+    def dragged(v: V, parameters: Parameters, time_step: F) -> V:
+        f = exchange(v, parameters) * time_step
+        solid = parameters.solid_density
+        liquid = parameters.liquid_density
+        return v + V(f[0] / solid, f[1] / solid, f[2] / liquid, f[3] / liquid)
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
@@ -82,11 +113,21 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
         volume = points.volume[p]
         stress = points.stress[p]
         velocity = points.velocity[p] * reference
+        time_step = F(clock[wp.static(TIME_STEP)])
+        gravity = V()
+        if TWO_PHASE:
+            gravity = V(parameters.gravity[0], parameters.gravity[1], parameters.gravity[0], parameters.gravity[1])
+        else:
+            gravity = V(parameters.gravity[0], parameters.gravity[1])
 
-        grid.block[(ci - 1) / wp.static(BLOCK), (cj - 1) / wp.static(BLOCK)] = 2
-        grid.block[(ci + 1) / wp.static(BLOCK), (cj - 1) / wp.static(BLOCK)] = 2
-        grid.block[(ci - 1) / wp.static(BLOCK), (cj + 1) / wp.static(BLOCK)] = 2
-        grid.block[(ci + 1) / wp.static(BLOCK), (cj + 1) / wp.static(BLOCK)] = 2
+        block_left = (ci - 1) / wp.static(BLOCK)
+        block_right = (ci + 1) / wp.static(BLOCK)
+        block_low = (cj - 1) / wp.static(BLOCK)
+        block_high = (cj + 1) / wp.static(BLOCK)
+        mark(grid, parameters, block_left, block_low)
+        mark(grid, parameters, block_right, block_low)
+        mark(grid, parameters, block_left, block_high)
+        mark(grid, parameters, block_right, block_high)
 
         pressure = F(0.0)
         if LIQUID:
@@ -99,11 +140,33 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             n = parameters.porosity
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
-        xx = (solid_pressure - stress[0]) * volume
-        yy = (solid_pressure - stress[1]) * volume
-        xy = -stress[3] * volume
-        pore = pressure * volume
-
+        push = volume
+        if APIC:
+            # The nodes receive the momentum at the end of the step: the force's share of it rides along.
+            push = volume * time_step / parameters.solid_density
+            if EXPLICIT_DRAG:
+                velocity = dragged(velocity, parameters, time_step)
+            velocity += reference * time_step * gravity
+            if TWO_PHASE:
+                liquid_force *= time_step / parameters.liquid_density
+        xx = (solid_pressure - stress[0]) * push
+        yy = (solid_pressure - stress[1]) * push
+        xy = -stress[3] * push
+        # Force on a node: force_x times the weight's slope along x, plus force_y times that along y.
+        force_x = V()
+        force_y = V()
+        if TWO_PHASE:
+            force_x = V(xx, xy, liquid_force, F(0.0))
+            force_y = V(xy, yy, F(0.0), liquid_force)
+        else:
+            force_x = V(xx, xy)
+            force_y = V(xy, yy)
+        alone = F(0.0)
+        share = F(1.0)
+        if PORE_FORCE:
+            alone = pressure * volume * time_step / parameters.true_liquid_density
+            if FLIP:
+                share = time_step / parameters.solid_density
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
         affine_x = V()
@@ -111,26 +174,39 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
         if APIC:
             affine_x = points.affine_x[p] * (parameters.spacing * reference)
             affine_y = points.affine_y[p] * (parameters.spacing * reference)
+            if EXPLICIT_DRAG:
+                affine_x = dragged(affine_x, parameters, time_step)
+                affine_y = dragged(affine_y, parameters, time_step)
+
+        # What depends on x alone is formed once per column of nodes.
         for k in range(3):
+            i = ci + (k - 1)
+            column_mass = wx[k] * reference
+            column_force = dx[k] * force_x
+            column_slope = wx[k] * force_y
+            column_velocity = wx[k] * velocity
+            column_affine = V()
+            if APIC:
+                column_velocity = wx[k] * (velocity + to_x[k] * affine_x) + column_force
+                column_affine = wx[k] * affine_y
             for m in range(3):
-                i = ci + (k - 1)
                 j = cj + (m - 1)
-                w = wx[k] * wy[m]
-                gx = dx[k] * wy[m]
-                gy = wx[k] * dy[m]
-                grid.mass[i, j] += w * reference
-                if FLIP:
-                    grid.momentum[i, j] += w * velocity
-                else:
-                    grid.momentum[i, j] += w * (velocity + to_x[k] * affine_x + to_y[m] * affine_y)
-                if TWO_PHASE:
-                    grid.force[i, j] += V(
-                        xx * gx + xy * gy, xy * gx + yy * gy, liquid_force * gx, liquid_force * gy
+                grid.mass[i, j] += wy[m] * column_mass
+                if APIC:
+                    grid.momentum[i, j] += (
+                        wy[m] * column_velocity + (wy[m] * to_y[m]) * column_affine + dy[m] * column_slope
                     )
                 else:
-                    grid.force[i, j] += V(xx * gx + xy * gy, xy * gx + yy * gy)
+                    force = wy[m] * column_force + dy[m] * column_slope
+                    if EXPLICIT_DRAG:
+                        force += wy[m] * exchange(column_velocity, parameters)
+                    grid.momentum[i, j] += wy[m] * column_velocity
+                    grid.force[i, j] += force
                 if PORE_FORCE:
-                    grid.pore_force[i, j] += V2(pore * gx, pore * gy)
+                    gx = dx[k] * wy[m]
+                    gy = wx[k] * dy[m]
+                    surplus = gx * (V2(alone, F(0.0)) - share * force_x) + gy * (V2(F(0.0), alone) - share * force_y)
+                    grid.liquid_surplus[i, j] += surplus
 
     @wp.kernel(module=module)
     def gather(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
@@ -161,19 +237,28 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
         affine_x = V()
         affine_y = V()
         for k in range(3):
+            i = ci + (k - 1)
+            column = V()
+            column_increment = V()
+            column_slope = V()
+            column_affine = V()
             for m in range(3):
-                i = ci + (k - 1)
                 j = cj + (m - 1)
-                w = wx[k] * wy[m]
                 v = grid.velocity[i, j]
-                smooth += w * v
+                column += wy[m] * v
+                column_slope += dy[m] * v
                 if FLIP:
-                    increment += w * grid.increment[i, j]
+                    column_increment += wy[m] * grid.increment[i, j]
                 else:
-                    affine_x += (w * to_x[k]) * v
-                    affine_y += (w * to_y[m]) * v
-                along_x += (dx[k] * wy[m]) * v
-                along_y += (wx[k] * dy[m]) * v
+                    column_affine += (wy[m] * to_y[m]) * v
+            smooth += wx[k] * column
+            along_x += dx[k] * column
+            along_y += wx[k] * column_slope
+            if FLIP:
+                increment += wx[k] * column_increment
+            else:
+                affine_x += (wx[k] * to_x[k]) * column
+                affine_y += wx[k] * column_affine
 
         if FLIP:
             pic = wp.min(parameters.pic_rate * time_step, F(1.0))
@@ -233,4 +318,4 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                     else:
                         grid.corner[ci - 1 + k, cj - 1 + m] += S(h, h * divergence)
 
-    return SimpleNamespace(clear=clear, scatter=scatter, gather=gather)
+    return SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
