@@ -37,7 +37,7 @@ static fmi2Status tell(Unit *unit, fmi2Status status) {
 static int check(Unit *unit, int reference) {
     const Entry *entry = &TABLE[reference];
     double value = unit->state.values[reference];
-    if (entry->kind == ENUMERATION) {
+    if (entry->kind == INTEGER) {
         if (value >= entry->minimum && value <= entry->maximum) return 1;
         return refuse(unit, "%s is %d, it must be one of %s.", entry->name, (int)value, entry->range);
     }
@@ -225,7 +225,7 @@ static fmi2Status set(Unit *unit, int kind, fmi2ValueReference reference, double
     }
 
 GET_AND_SET(Real, fmi2Real, REAL)
-GET_AND_SET(Integer, fmi2Integer, ENUMERATION)
+GET_AND_SET(Integer, fmi2Integer, INTEGER)
 GET_AND_SET(Boolean, fmi2Boolean, BOOLEAN)
 
 static fmi2Status no_strings(Unit *unit, size_t count) {

@@ -21,7 +21,7 @@ typedef struct {
     int life;
     int stale; /* whether parameters or inputs were set since the outputs were computed */
     double time;
-    double values[VARIABLE_COUNT]; /* Real, Enumeration and Boolean alike */
+    double values[VARIABLE_COUNT]; /* Real, Integer and Boolean alike */
     Model model;
 } State;
 

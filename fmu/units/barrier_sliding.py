@@ -17,7 +17,7 @@ from .interface import (
     NEWTON_PER_METRE,
     PASCAL,
     SECOND,
-    Enumeration,
+    Choice,
     Interface,
     Variable,
 )
@@ -37,9 +37,9 @@ _PHASE_TEXTS = {
     "inertia": "The impact force has ended, the barrier still slides",
     "rest": "The impact force has ended, the barrier holds still",
 }
-VARIANT = Enumeration("Variant", "Variant of the closed-form model", tuple((n, _VARIANT_TEXTS[n]) for n in VARIANTS))
-PHASE = Enumeration("ImpactPhase", "Phase of the impact", tuple((n, _PHASE_TEXTS[n]) for n in PHASES))
-FORCE_SOURCE = Enumeration(
+VARIANT = Choice("Variant", "Variant of the closed-form model", tuple((n, _VARIANT_TEXTS[n]) for n in VARIANTS))
+PHASE = Choice("ImpactPhase", "Phase of the impact", tuple((n, _PHASE_TEXTS[n]) for n in PHASES))
+FORCE_SOURCE = Choice(
     "ImpactForceSource",
     "Where the impact force comes from",
     (
@@ -151,8 +151,8 @@ VARIABLES = (
         open_minimum=True,
         nominal=10.0,
     ),
-    Variable("variant", "parameter", VARIANT.description, "Enumeration", start=1, choice=VARIANT),
-    Variable("impact_force_source", "parameter", FORCE_SOURCE.description, "Enumeration", start=1, choice=FORCE_SOURCE),
+    Variable("variant", "parameter", VARIANT.description, "Integer", start=1, choice=VARIANT),
+    Variable("impact_force_source", "parameter", FORCE_SOURCE.description, "Integer", start=1, choice=FORCE_SOURCE),
     _force_input(
         "external_force",
         "Horizontal force on the barrier per metre of width beside the impact, positive in the direction of the flow",
@@ -196,7 +196,7 @@ VARIABLES = (
         minimum=0.0,
         nominal=1e6,
     ),
-    Variable("impact_phase", "output", PHASE.description, "Enumeration", choice=PHASE),
+    Variable("impact_phase", "output", PHASE.description, "Integer", choice=PHASE),
 )
 
 INTERFACE = Interface(

@@ -18,7 +18,7 @@ from .interface import (
     NEWTON_PER_METRE,
     PASCAL,
     SECOND,
-    Enumeration,
+    Choice,
     Interface,
     Unit,
     Variable,
@@ -29,7 +29,7 @@ from .worker_process import WorkerProcess
 SCENARIO = "scenario.json"
 """File in the archive's resources with the scenario that runs unless another is named."""
 
-BARRIER_MOTION = Enumeration(
+BARRIER_MOTION = Choice(
     "BarrierMotion",
     "What moves the barrier",
     (
@@ -67,9 +67,7 @@ INTERFACE = Interface(
             start=0.0,
             minimum=0.0,
         ),
-        Variable(
-            "barrier_motion", "parameter", BARRIER_MOTION.description, "Enumeration", start=1, choice=BARRIER_MOTION
-        ),
+        Variable("barrier_motion", "parameter", BARRIER_MOTION.description, "Integer", start=1, choice=BARRIER_MOTION),
         Variable(
             "reply_time_limit",
             "parameter",

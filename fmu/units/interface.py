@@ -35,8 +35,12 @@ CUBIC_METRE_PER_METRE = Unit("m3/m", m=2)
 
 
 @dataclass(frozen=True)
-class Enumeration:
-    """A closed choice; FMI counts its items from 1."""
+class Choice:
+    """A closed choice, of which a variable holds the number; numbers count from 1.
+
+    An FMI enumeration would say the same, but some importers skip variables of that type (libcosim does), and with
+    them the setting: hence Integer variables whose descriptions list the choice.
+    """
 
     name: str
     description: str
@@ -54,9 +58,9 @@ class Enumeration:
 class Variable:
     """One variable of a unit.
 
-    ``kind`` is ``Real``, ``Enumeration``, ``Boolean`` or ``String``; ``causality`` is ``parameter``, ``input`` or
-    ``output``. ``start`` is given for parameters and inputs alone: outputs are calculated. ``minimum`` and ``maximum``
-    bound the value; with ``open_minimum`` the minimum itself is refused.
+    ``kind`` is ``Real``, ``Integer`` (a choice), ``Boolean`` or ``String``; ``causality`` is ``parameter``, ``input``
+    or ``output``. ``start`` is given for parameters and inputs alone: outputs are calculated. ``minimum`` and
+    ``maximum`` bound the value; with ``open_minimum`` the minimum itself is refused.
     """
 
     name: str
@@ -69,7 +73,7 @@ class Variable:
     maximum: float | None = None
     open_minimum: bool = False
     nominal: float = 1.0
-    choice: Enumeration | None = None
+    choice: Choice | None = None
 
     @property
     def variability(self) -> str:

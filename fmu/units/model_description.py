@@ -5,7 +5,7 @@ from __future__ import annotations
 import uuid
 from xml.etree.ElementTree import Element, SubElement
 
-from .interface import Enumeration, Interface, Unit, Variable
+from .interface import Interface, Unit, Variable
 
 AUTHOR = "The developers of warp-mpm-impact"
 LICENSE = "Apache-2.0"
@@ -79,7 +79,6 @@ def model_description(
         for name in source_files:
             SubElement(files, "File", {"name": name})
     _unit_definitions(root, interface)
-    _type_definitions(root, interface)
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         SubElement(categories, "Category", {"name": name, "description": description})
@@ -95,6 +94,11 @@ def model_description(
     return root
 
 
+def full_description(variable: Variable) -> str:
+    """The description with the meaning of each number of a choice."""
+    return f"{variable.description}: {variable.range_text}" if variable.choice else variable.description
+
+
 def _unit_definitions(root: Element, interface: Interface) -> None:
     units: dict[str, Unit] = {v.unit.name: v.unit for v in interface.variables if v.kind == "Real"}
     definitions = SubElement(root, "UnitDefinitions")
@@ -107,23 +111,11 @@ def _unit_definitions(root: Element, interface: Interface) -> None:
             SubElement(element, "DisplayUnit", {"name": unit.display_name, "factor": _number(unit.display_factor)})
 
 
-def _type_definitions(root: Element, interface: Interface) -> None:
-    choices: dict[str, Enumeration] = {v.choice.name: v.choice for v in interface.variables if v.choice}
-    if not choices:
-        return
-    definitions = SubElement(root, "TypeDefinitions")
-    for choice in choices.values():
-        simple_type = SubElement(definitions, "SimpleType", {"name": choice.name, "description": choice.description})
-        enumeration = SubElement(simple_type, "Enumeration")
-        for value, (name, description) in enumerate(choice.items, 1):
-            SubElement(enumeration, "Item", {"name": name, "value": str(value), "description": description})
-
-
 def _scalar_variable(reference: int, variable: Variable) -> Element:
     attributes = {
         "name": variable.name,
         "valueReference": str(reference),
-        "description": variable.description,
+        "description": full_description(variable),
         "causality": variable.causality,
         "variability": variable.variability,
     }
@@ -146,7 +138,6 @@ def _scalar_variable(reference: int, variable: Variable) -> Element:
         if variable.start is not None:
             typed["start"] = _number(float(variable.start))
     elif variable.choice is not None:
-        typed["declaredType"] = variable.choice.name
         typed["min"], typed["max"] = "1", str(len(variable.choice.items))
         if variable.start is not None:
             typed["start"] = str(variable.start)

@@ -83,7 +83,7 @@ class UnitSlave(Fmi2Slave):
         self.stale = True  # whether parameters or inputs were set since the outputs were computed
         self._of_kind = {
             kind: frozenset(number for number, v in enumerate(self.interface.variables) if v.kind == kind)
-            for kind in ("Real", "Enumeration", "Boolean", "String")
+            for kind in ("Real", "Integer", "Boolean", "String")
         }
         references = self.interface.references
         self._inputs = [(references[v.name], v) for v in self.interface.of("input")]
@@ -235,7 +235,7 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def get_integer(self, vrs: Sequence[int]) -> list[int]:
-        return self._get("Enumeration", vrs)
+        return self._get("Integer", vrs)
 
     @guarded
     def get_boolean(self, vrs: Sequence[int]) -> list[bool]:
@@ -251,7 +251,7 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def set_integer(self, vrs: Sequence[int], values: Sequence[int]) -> None:
-        self._set("Enumeration", vrs, values)
+        self._set("Integer", vrs, values)
 
     @guarded
     def set_boolean(self, vrs: Sequence[int], values: Sequence[bool]) -> None:
@@ -299,5 +299,5 @@ class UnitSlave(Fmi2Slave):
 def _initial_value(variable: Variable) -> Value:
     if variable.start is not None:
         return variable.start
-    undefined: dict[str, Value] = {"Real": math.nan, "Enumeration": 1, "Boolean": False, "String": ""}
+    undefined: dict[str, Value] = {"Real": math.nan, "Integer": 1, "Boolean": False, "String": ""}
     return undefined[variable.kind]

@@ -56,7 +56,7 @@ class Host:
 
     def _access(self, name: str, verb: str) -> Callable[..., Any]:
         kind = self.variables[name].type
-        return getattr(self.fmu, verb + {"Enumeration": "Integer"}.get(kind, kind))
+        return getattr(self.fmu, verb + kind)
 
     def __getitem__(self, name: str) -> Any:
         return self._access(name, "get")([self.variables[name].valueReference])[0]

@@ -103,7 +103,6 @@ def test_elements_stand_in_the_standard_order(name: str, archives: dict[str, Pat
     order = [
         "CoSimulation",
         "UnitDefinitions",
-        "TypeDefinitions",
         "LogCategories",
         "DefaultExperiment",
         "ModelVariables",
