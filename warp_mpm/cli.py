@@ -41,17 +41,22 @@ def run(
     ] = None,
     device: Annotated[str, typer.Option(help="Warp device: cpu, cuda:0, ...")] = "cpu",
     spacing: Annotated[
-        float | None, typer.Option(help="Grid spacing [m].", show_default="that of the scenario")
+        float | None, typer.Option(help="Grid spacing in metres.", show_default="that of the scenario")
     ] = None,
-    until: Annotated[float | None, typer.Option(help="End time [s].", show_default="that of the scenario")] = None,
+    until: Annotated[
+        float | None, typer.Option(help="End time in seconds.", show_default="that of the scenario")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
 ) -> None:
     """Simulate a scenario and write its results into a folder.
 
-    The folder then holds the resolved scenario, the time series (timeseries.csv), the key figures (summary.json), the
-    material points at intervals (snapshots.vtkhdf, for ParaView and h5py), two figures and the run's record (run.json).
-    Ctrl-C ends the run cleanly and keeps all that was computed.
+    The folder then holds the key figures (summary.json), the time series (timeseries.csv), the material points at
+    intervals (snapshots.vtkhdf, for ParaView and h5py), two figures (PNG), the resolved scenario (scenario.json) and
+    the record of the run (run.json).
+
+    Ctrl-C ends the run cleanly and keeps all that was computed. Exit codes: 0 done, 2 the input cannot be used, 3 the
+    simulation diverged, 130 interrupted.
     """
     scenario = _scenario(scenario_file, spacing, until)
     folder = out if out is not None else Path("runs") / scenario_file.stem

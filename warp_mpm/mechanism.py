@@ -56,20 +56,6 @@ def deposit(scenario: Scenario, snapshot: Snapshot) -> dict[str, float | None]:
     return result
 
 
-def upstream_pore_pressure(scenario: Scenario, snapshot: Snapshot) -> float:
-    """Greatest pore pressure [Pa] upstream of the crest, or anywhere without a barrier; 0 for a dry flow.
-
-    The landing of a jet far downstream, harder than any impact on the barrier, is left out.
-    """
-    if "pore_pressure" not in snapshot:
-        return 0.0
-    pressure = snapshot["pore_pressure"]
-    if scenario.barrier is not None:
-        x = snapshot.position[:, 0] - (snapshot.barrier_displacement or 0.0)
-        pressure = pressure[x <= _crest(scenario)[0]]
-    return float(pressure.max(initial=0.0))
-
-
 def impact_mechanism(scenario: Scenario, snapshots: Iterable[Snapshot]) -> tuple[str | None, dict[str, float]]:
     """Name of the mechanism (`RULE`) and the measures it rests on; no name without a barrier.
 

@@ -144,7 +144,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("impact from", plain("impact_start_time", "s", 3)),
         ("rise time T₁, duration T₂", _pair(plain("rise_time", "s", 3), plain("impact_duration", "s", 3))),
         ("pore pressure, greatest", kilo("pore_pressure_max", "kPa", "pore_pressure_max_time")),
-        ("  upstream of the crest", kilo("upstream_pore_pressure_max", "kPa", "upstream_pore_pressure_max_time")),
+        ("  landing jet included", kilo("pore_pressure_max_anywhere", "kPa", "pore_pressure_max_anywhere_time")),
         ("barrier velocity, greatest", plain("barrier_velocity_max", "m/s")),
         ("barrier displacement", plain("barrier_displacement_final", "m", 3)),
         ("volume [m³/m]", ", ".join(volumes) or None),

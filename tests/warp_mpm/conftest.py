@@ -77,6 +77,7 @@ class FlyingPoints:
         }
         if self._start.liquid_mass.any():
             sample["liquid_mass"] = float(self._start.liquid_mass.sum())
+            sample["pore_pressure_max_anywhere"] = 3e5
             sample["pore_pressure_max"] = 1e5 * math.exp(-((self.time - 1) ** 2))
         return sample
 

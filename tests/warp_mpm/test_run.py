@@ -47,6 +47,8 @@ def test_a_finished_run(tmp_path, coarse_case_1, flying_points):
     assert summary["impulse"] == pytest.approx(0.5 * flying_points.PEAK * 1.5)
     assert summary["barrier_displacement_final"] == pytest.approx(0.9)
     assert summary["pore_pressure_max"] == pytest.approx(1e5)
+    assert summary["pore_pressure_max_time"] == pytest.approx(1.0)
+    assert summary["pore_pressure_max_anywhere"] == pytest.approx(3e5)
     assert summary["material_points"] == len(results.snapshots[0].position)
     assert summary["mass_error"] == 0.0
     assert (summary["steps"], summary["time_step_limit"]) == (600, "wave")

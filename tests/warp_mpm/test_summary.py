@@ -175,14 +175,6 @@ def test_measures_of_the_mechanism(load_scene):
     assert mechanism.impact_mechanism(load_scene("case_1"), [frame(1, moved, displacement=2.0)])[1] == measures
 
 
-def test_a_landing_jet_does_not_count_as_impact_pressure(load_scene):
-    still = frame(1, [[-1, 1], [5, 3], [20, 0.1]])
-    wet = Snapshot(1, 2.0, still.position, {"pore_pressure": np.array([1e5, 2e5, 9e6])})
-    assert mechanism.upstream_pore_pressure(load_scene("case_1"), wet) == 2e5  # the crest has moved to x = 5.5
-    assert mechanism.upstream_pore_pressure(load_scene("case_1", barrier=None), wet) == 9e6
-    assert mechanism.upstream_pore_pressure(load_scene("case_1_dry"), still) == 0.0
-
-
 def test_no_barrier_no_mechanism(load_scene):
     assert mechanism.impact_mechanism(load_scene("case_1", barrier=None), []) == (None, {})
 
