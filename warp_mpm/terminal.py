@@ -59,7 +59,7 @@ class RunDisplay:
         if self._console.is_terminal and not self._console.quiet:
             self._bar = Progress(
                 SpinnerColumn(),
-                BarColumn(bar_width=24),
+                BarColumn(bar_width=max(4, min(24, self._console.width - 78))),
                 TextColumn("{task.description}"),
                 console=self._console,
                 transient=True,
@@ -174,4 +174,4 @@ def _state(progress: RunProgress) -> str:
         parts.append(f"F₂ₓ = {progress.sample['impact_force_x'] / 1e3:.0f} kN/m")
     if "barrier_velocity" in progress.sample:
         parts.append(f"v₂ = {progress.sample['barrier_velocity']:.2f} m/s")
-    return "   ".join(parts)
+    return "  ".join(parts)

@@ -52,7 +52,7 @@ def test_run_fills_the_default_folder_and_tells_the_figures(command):
     ):
         assert words in result.stdout
     # In a pipe: a line when it begins to run, one for every tenth, and no control characters.
-    assert result.stdout.count("of 1 s   ") == 11
+    assert result.stdout.count("of 1 s  ") == 11
     assert "\x1b" not in result.stdout
 
 

@@ -72,7 +72,7 @@ def record_until(
         recorders: each is called with the simulation.
         end_time: [s].
         on_step: called after each stretch between records, for instance to show progress.
-        stop: asked between stretches; true ends the run early, with a last record.
+        stop: asked after each stretch; true ends the run early, with a last record.
 
     Returns:
         True when `end_time` was reached, False when stopped before.
@@ -80,14 +80,13 @@ def record_until(
     for recorder in recorders:
         if recorder.schedule.due(simulation.time):
             recorder.record(simulation)
-    while simulation.time < end_time:
-        if stop():
-            break
+    ended = simulation.time >= end_time
+    while not ended:
         simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]))
-        reached = simulation.time >= end_time
+        ended = simulation.time >= end_time or stop()
         for recorder in recorders:
             # The end is recorded even where it is no multiple of the interval.
-            if recorder.schedule.due(simulation.time) or reached:
+            if recorder.schedule.due(simulation.time) or ended:
                 recorder.record(simulation)
         if on_step is not None:
             on_step(simulation)
