@@ -1,0 +1,252 @@
+"""The closed-form unit against the simulation of the same scenario: one figure, one table of differences.
+
+Three ways of giving the unit its force are compared with the simulation:
+
+``paper``
+    lambda as the paper prints it for fixed and sliding barriers; tau, which the paper does not print, as assumed in
+    ``analytic.scene``.
+``calibrated``
+    s1max and tau from the simulated force, by the paper's rule: its peak and the time of its peak.
+``simulated force``
+    The simulated force and vertical load as inputs of the unit. What is left is the barrier's own motion, so this tells
+    a fault in the unit from a limit of the closed form.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.calibration import calibrate, cumulative_impulse, measure, moving_mean
+from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
+
+if TYPE_CHECKING:
+    from warp_mpm import Scenario
+
+Array = NDArray[np.float64]
+
+FIGURES = {
+    "peak_force": ("peak force", "kN/m", 1e-3),
+    "peak_force_time": ("time of the peak", "s", 1.0),
+    "impulse": ("impulse", "kN s/m", 1e-3),
+    "barrier_velocity_max": ("v2,max", "m/s", 1.0),
+    "barrier_displacement_final": ("Δx_f", "m", 1.0),
+}
+"""Key figures by name: label, unit shown, and its factor from SI."""
+
+CURVES = {"force": "F", "barrier_velocity": "v2", "barrier_displacement": "Δx"}
+"""Curves by name, with their symbols."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Force [N/m], barrier velocity [m/s] and displacement [m] over time [s], each an array [samples]."""
+
+    time: Array
+    force: Array
+    barrier_velocity: Array
+    barrier_displacement: Array
+    vertical_load: Array | None = None
+    """Downward force of the flow on the barrier [N/m], where it is known."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One way of running the unit, beside the simulation."""
+
+    name: str
+    parameters: dict[str, Any]
+    trajectory: Trajectory
+    figures: dict[str, float]
+    """Key figures of the unit, SI."""
+    errors: dict[str, float | None]
+    """Their relative differences from the simulation; None where the simulation's figure is nil."""
+    root_mean_squares: dict[str, float | None]
+    """Of the differences of the curves, over the largest simulated value; None for a curve that is nil."""
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """All comparisons of one scenario."""
+
+    title: str
+    scene: Scene
+    simulated: Trajectory
+    figures: dict[str, float]
+    filter_rule: str
+    comparisons: tuple[Comparison, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """What a program wants to know, without the curves."""
+        return {
+            "title": self.title,
+            "simulation": self.figures,
+            "filter": self.filter_rule,
+            "units": [
+                {key: value for key, value in asdict(comparison).items() if key != "trajectory"}
+                for comparison in self.comparisons
+            ],
+        }
+
+
+def cross_check(
+    scenario: Scenario, unit: Path, *, device: str = "cpu", on_progress: Callable[[float], None] | None = None
+) -> CrossCheck:
+    """Simulate a scenario, calibrate the closed form on it, and run the unit through fmpy in its three ways.
+
+    Parameters
+    ----------
+    scenario: with a fixed or a sliding barrier.
+    unit: archive of ``BarrierSliding``, or of its C twin.
+    device: of the simulation.
+    on_progress: called with the simulated time [s] now and then.
+
+    Raises
+    ------
+    SceneError: the closed form has no answer to the scenario.
+    CalibrationError: the flow does not hit the barrier within the run.
+    """
+    scene = scene_of(json.loads(scenario.model_dump_json()), scenario.title)
+    simulated = simulate(scenario, device=device, on_progress=on_progress)
+    fit = calibrate(simulated.time, simulated.force, scene)
+    common = {"arrival_time": fit.measured.arrival_time, **scene_parameters(scene)}
+    ways: dict[str, dict[str, Any]] = {
+        "paper": {"geometry_change": scene.paper_geometry_change, "rise_ratio": ASSUMED_RISE_RATIO},
+        "calibrated": {"s1max": fit.impact.geometry_change_length, "rise_ratio": fit.impact.rise_ratio},
+        "simulated force": {"impact_force_source": 2},
+    }
+    figures = key_figures(simulated)
+    comparisons = []
+    for name, own in ways.items():
+        parameters = common | own
+        trajectory = run_unit(unit, parameters, simulated)
+        found = key_figures(trajectory, filtered=name == "simulated force")
+        comparisons.append(
+            Comparison(
+                name,
+                parameters,
+                trajectory,
+                found,
+                {key: _relative(found[key], figures[key]) for key in FIGURES},
+                {key: _root_mean_square(getattr(trajectory, key), getattr(simulated, key)) for key in CURVES},
+            )
+        )
+    return CrossCheck(scenario.title, scene, simulated, figures, fit.measured.filter_rule, tuple(comparisons))
+
+
+def simulate(
+    scenario: Scenario, *, device: str = "cpu", on_progress: Callable[[float], None] | None = None
+) -> Trajectory:
+    """The simulation's force on the barrier and its motion, at the interval of the scenario's time series."""
+    from warp_mpm import Simulation
+
+    simulation = Simulation(scenario, device=device)
+    count = round(scenario.output.end_time_s / scenario.output.time_series_interval_s)
+    rows = []
+    for step in range(count + 1):
+        simulation.advance(until=step * scenario.output.time_series_interval_s)
+        sample = simulation.sample()
+        surfaces = ("impact_force", "top_force", "back_force")
+        rows.append(
+            (
+                sample["time"],
+                sum(sample[f"{surface}_x"] for surface in surfaces),
+                sample["barrier_velocity"],
+                sample["barrier_displacement"],
+                -sum(sample[f"{surface}_y"] for surface in surfaces),
+            )
+        )
+        if on_progress is not None and step % 20 == 0:
+            on_progress(sample["time"])
+    return Trajectory(*np.array(rows).T)
+
+
+def scene_parameters(scene: Scene) -> dict[str, Any]:
+    """The unit's parameters for a scene, all but the force."""
+    parameters: dict[str, Any] = {
+        "flow_mass": scene.flow_mass,
+        "flow_length": scene.flow_length,
+        "flow_height": scene.flow_height,
+        "speed": scene.speed,
+        "gravity": scene.gravity,
+    }
+    if scene.barrier_mass is None:
+        return parameters | {"barrier_fixed": True}
+    return parameters | {"barrier_mass": scene.barrier_mass, "base_friction": scene.base_friction}
+
+
+def run_unit(unit: Path, parameters: dict[str, Any], simulated: Trajectory) -> Trajectory:
+    """The unit's trajectory at the simulation's times, through fmpy, with the simulated loads as inputs if asked."""
+    from fmpy import extract, read_model_description
+    from fmpy.fmi2 import FMU2Slave
+
+    description = read_model_description(str(unit))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    folder = extract(str(unit), unzipdir=tempfile.mkdtemp(prefix="fmu_check_"))
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="cross_check",
+    )
+    try:
+        fmu.instantiate()
+        fmu.setupExperiment(startTime=float(simulated.time[0]))
+        for name, value in parameters.items():
+            {"Real": fmu.setReal, "Integer": fmu.setInteger, "Boolean": fmu.setBoolean}[variables[name].type](
+                [variables[name].valueReference], [value]
+            )
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        outputs = [variables[n].valueReference for n in ("impact_force", "barrier_velocity", "barrier_displacement")]
+        inputs = [variables[name].valueReference for name in ("impact_force_input", "vertical_load")]
+        rows = [fmu.getReal(outputs)]
+        for index in range(len(simulated.time) - 1):
+            if parameters.get("impact_force_source") == 2:
+                assert simulated.vertical_load is not None
+                # The simulation's forces are means over the interval that ends at their time.
+                fmu.setReal(inputs, [simulated.force[index + 1], simulated.vertical_load[index + 1]])
+            now = float(simulated.time[index])
+            fmu.doStep(now, float(simulated.time[index + 1]) - now)
+            rows.append(fmu.getReal(outputs))
+        fmu.terminate()
+    finally:
+        fmu.freeInstance()
+        shutil.rmtree(folder, ignore_errors=True)
+    return Trajectory(simulated.time, *np.array(rows).T)
+
+
+def key_figures(trajectory: Trajectory, *, filtered: bool = True) -> dict[str, float]:
+    """Key figures of a trajectory, SI.
+
+    ``filtered`` is for forces of the simulation: their peak is that of the moving mean over 50 ms. The impulse is that
+    from arrival to the end of the impact, as ``analytic.calibration.measure`` tells them.
+    """
+    measured = measure(trajectory.time, trajectory.force)
+    force = moving_mean(trajectory.time, trajectory.force, measured.filter_window) if filtered else trajectory.force
+    peak = int(np.argmax(force))
+    impulse = cumulative_impulse(trajectory.time, trajectory.force)
+    return {
+        "peak_force": float(force[peak]),
+        "peak_force_time": float(trajectory.time[peak]),
+        "impulse": measured.impulse if filtered else float(impulse[-1]),
+        "barrier_velocity_max": float(trajectory.barrier_velocity.max()),
+        "barrier_displacement_final": float(trajectory.barrier_displacement[-1]),
+    }
+
+
+def _relative(value: float, reference: float) -> float | None:
+    return value / reference - 1 if reference else None
+
+
+def _root_mean_square(values: Array, reference: Array) -> float | None:
+    scale = float(np.abs(reference).max())
+    return float(np.sqrt(np.mean((values - reference) ** 2))) / scale if scale > 0 else None
