@@ -23,6 +23,8 @@ class Effects:
     """Volume strain rates averaged over the cells' corners (anti-locking)."""
     pressure_relaxation: bool = True
     """Excess pore pressure drawn toward its grid projection at a given rate."""
+    bulk_viscosity: bool = False
+    """Artificial viscosity on compression, against ringing behind a front of sound."""
     transfer: Literal["flip", "apic"] = "flip"
     """Velocity update: Sulsky's (FLIP, with a PIC share given as a rate) or affine (APIC)."""
     drag: Literal["none", "semi_implicit", "explicit"] = "none"
@@ -35,6 +37,8 @@ class Effects:
     ground: Literal["none", "smooth", "frictional"] = "none"
     side_walls: bool = False
     """Smooth vertical walls at the left or right edge of the domain."""
+    ceiling: bool = False
+    """Smooth wall at the upper edge of the domain."""
 
     @property
     def liquid(self) -> bool:
@@ -78,6 +82,8 @@ class Effects:
                 "porosity_update",
                 "barrier_friction",
                 "side_walls",
+                "ceiling",
+                "bulk_viscosity",
             )
             if getattr(self, name)
         ]

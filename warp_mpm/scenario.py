@@ -504,6 +504,8 @@ class Numerics(_Model):
     """Volume strains are averaged over the grid, against volumetric locking."""
     pressure_relaxation: NonNegative = 1.0
     """Rate at which the noise of point pressures about their grid average decays, per sound crossing of a cell [-]."""
+    bulk_viscosity: Annotated[float, Field(ge=0.0, le=2.0)] = 0.2
+    """Artificial viscosity on compression, as a share b of rho c d (density, sound speed, spacing); 0 is none."""
     precision: Literal["float64", "float32"] = "float64"
     """Floating-point numbers of the simulation."""
 

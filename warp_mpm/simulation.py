@@ -16,6 +16,7 @@ from .effects import Effects
 from .grid import contact_nodes, fit_grid, open_corner_volumes
 from .kernels import layout as at
 from .kernels.build import build_kernels
+from .kernels.mohr_coulomb import yield_constants
 from .scenario import STANDARD_GRAVITY, DryFlow, Fixed, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
 from .time_step import step_limits
 
@@ -49,6 +50,8 @@ def derive_effects(scenario: Scenario) -> Effects:
         barrier=motion,  # type: ignore[arg-type]
         barrier_friction=barrier is not None
         and max(barrier.friction.face, barrier.friction.top, barrier.friction.back) > 0.0,
+        bulk_viscosity=numerics.bulk_viscosity > 0.0,
+        ceiling=scenario.domain.top_edge == "wall",
         ground=surface,  # type: ignore[arg-type]
         side_walls="wall" in (scenario.domain.left_edge, scenario.domain.right_edge),
     )
@@ -102,7 +105,7 @@ class Simulation:
         young, nu = material.young_modulus_Pa, material.poisson_ratio
         shear = young / (2.0 * (1.0 + nu))
         lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
-        speed_per_cell = self._limits.wave_speed / numerics.spacing_m
+        speed_per_cell = self._limits.sound_speed / numerics.spacing_m
         values: dict[str, Any] = {
             "spacing": numerics.spacing_m,
             "inverse_spacing": 1.0 / numerics.spacing_m,
@@ -123,12 +126,18 @@ class Simulation:
             "pic_rate": numerics.pic_share * speed_per_cell,
         }
         if effects.plasticity:
-            friction = math.radians(material.friction_angle_deg)
-            values["sin_friction"] = math.sin(friction)
-            values["sin_dilatancy"] = math.sin(math.radians(material.dilatancy_angle_deg))
-            values["cohesion_term"] = 2.0 * material.cohesion_Pa * math.cos(friction)
-            apex = material.cohesion_Pa / math.tan(friction) if friction > 0.0 else math.inf
-            values["tension_limit"] = min(material.tension_cutoff_Pa, apex)
+            values |= yield_constants(
+                lame=lame,
+                shear_modulus=shear,
+                friction_angle=math.radians(material.friction_angle_deg),
+                dilatancy_angle=math.radians(material.dilatancy_angle_deg),
+                cohesion=material.cohesion_Pa,
+                tension_cutoff=material.tension_cutoff_Pa,
+            )
+        if effects.bulk_viscosity:
+            values["bulk_viscosity"] = (
+                numerics.bulk_viscosity * material.density * self._limits.sound_speed * numerics.spacing_m
+            )
         if effects.liquid:
             liquid: Any = material
             values["porosity"] = material.porosity
@@ -149,6 +158,10 @@ class Simulation:
         if scenario.ground is not None:
             values["ground_row"] = self.grid.ground_row
             values["ground_friction"] = scenario.ground.friction
+        if effects.ceiling:
+            top = scenario.domain.top_m
+            above = self.grid.rows - 4 if top is None else round((top - self.grid.bottom) / self.grid.spacing)
+            values["ceiling_row"] = above - 1
         if effects.side_walls:
             far = 1e6 * self.grid.spacing * self.grid.columns
             domain = scenario.domain
@@ -282,12 +295,16 @@ class Simulation:
             self._launch("ground", self._workers, grid, parameters, clock, self._reactions)
         if effects.side_walls:
             self._launch("side_walls", self.grid.rows, grid, parameters, clock, self._reactions)
+        if effects.ceiling:
+            self._launch("ceiling", self.grid.columns, grid, parameters, clock, self._reactions)
         if effects.barrier != "none":
             self._launch("collect", self._contact_count, self._contact, grid, parameters, clock)
             if effects.barrier == "sliding":
                 self._launch("slide", 1, self._contact, self._contact_count, parameters, clock, self._counters)
             self._launch("barrier", self._contact_count, self._contact, grid, parameters, clock, self._reactions)
         self._launch("gather", count, points, grid, parameters, clock)
+        if effects.smoothing_grid:
+            self._launch("average", self._workers, grid, parameters)
         self._launch("update", count, points, grid, parameters, clock, self._counters, self._left)
         self._launch(
             "tick", 1, parameters, clock, self._counters, self._running, self._reactions, self._left, self._times,

@@ -15,7 +15,10 @@ class StepLimits:
     """Bounds on the time step of a scene before the Courant number is applied."""
 
     wave_speed: float
-    """Fastest wave through the material at rest [m/s]; the flow's own speed is added as the run goes."""
+    """Fastest wave through the material at rest [m/s], for the bound on the step; the flow's own speed is added as the
+    run goes. Artificial viscosity b counts as a wave faster by b + sqrt(1 + b^2)."""
+    sound_speed: float
+    """Speed of sound in the material as a whole [m/s], without drag between its phases where there are two."""
     drag_step: float
     """Largest stable step of explicitly integrated drag and waves together [s]; infinite where drag is implicit."""
 
@@ -86,20 +89,20 @@ def explicit_drag_step(
 
 def step_limits(scenario: Scenario) -> StepLimits:
     """Bounds on the time step of `scenario` (audit, section 3.4)."""
-    flow = scenario.flow
+    flow, numerics = scenario.flow, scenario.numerics
+    drag = math.inf
     if isinstance(flow, TwoPhaseFlow):
         material = flow.material
-        fast, _ = biot_wave_speeds(
+        sound, _ = biot_wave_speeds(
             material.oedometric_modulus,
             material.liquid_bulk_modulus_Pa,
             material.porosity,
             material.grain_density_kg_per_m3,
             material.liquid_density_kg_per_m3,
         )
-        drag = math.inf
-        if scenario.numerics.drag == "explicit":
+        if numerics.drag == "explicit":
             drag = explicit_drag_step(
-                spacing=scenario.numerics.spacing_m,
+                spacing=numerics.spacing_m,
                 oedometric_modulus=material.oedometric_modulus,
                 liquid_bulk_modulus=material.liquid_bulk_modulus_Pa,
                 porosity=material.porosity,
@@ -107,12 +110,10 @@ def step_limits(scenario: Scenario) -> StepLimits:
                 liquid_density=material.liquid_density_kg_per_m3,
                 conductivity=material.hydraulic_conductivity,
             )
-        return StepLimits(fast, drag)
-    if isinstance(flow, UndrainedFlow):
-        material_undrained = flow.material
-        stiffness = material_undrained.liquid_bulk_modulus_Pa / material_undrained.porosity
-        return StepLimits(
-            undrained_wave_speed(material_undrained.oedometric_modulus, stiffness, material_undrained.density),
-            math.inf,
-        )
-    return StepLimits(undrained_wave_speed(flow.material.oedometric_modulus, 0.0, flow.material.density), math.inf)
+    elif isinstance(flow, UndrainedFlow):
+        stiffness = flow.material.liquid_bulk_modulus_Pa / flow.material.porosity
+        sound = undrained_wave_speed(flow.material.oedometric_modulus, stiffness, flow.material.density)
+    else:
+        sound = undrained_wave_speed(flow.material.oedometric_modulus, 0.0, flow.material.density)
+    viscosity = numerics.bulk_viscosity
+    return StepLimits(sound * (viscosity + math.hypot(1.0, viscosity)), sound, drag)

@@ -32,17 +32,14 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     clock = make_clock(types, module)
     kernels = SimpleNamespace(
         types=types,
-        clear=transfer.clear,
-        forget=transfer.forget,
-        scatter=transfer.scatter,
         move=momentum.move,
-        gather=transfer.gather,
+        **transfer.__dict__,
         update=constitutive.update,
         start=clock.start,
         tick=clock.tick,
         ledger=make_ledger(types, module).ledger,
     )
-    if effects.ground != "none" or effects.side_walls or effects.barrier != "none":
+    if effects.ground != "none" or effects.side_walls or effects.ceiling or effects.barrier != "none":
         contact = make_contact(types, momentum, module)
         kernels.__dict__.update(contact.kernels)
         if effects.barrier == "sliding":

@@ -36,6 +36,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
+    VISCOSITY = effects.bulk_viscosity
     GAP_BOUND = effects.gap_record and effects.smoothing_grid
 
     @wp.func
@@ -81,20 +82,18 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
         )
         opening = F(0.0)
         if PLASTICITY:
-            trial, opening = return_mapping(
-                trial,
-                parameters.lame,
-                parameters.shear_modulus,
-                parameters.sin_friction,
-                parameters.sin_dilatancy,
-                parameters.cohesion_term,
-                parameters.tension_limit,
-            )
+            trial, opening = return_mapping(trial, parameters)
         return trial, opening, deviatoric
 
     @wp.func
-    def room(filling: F) -> F:
+    def room(grid: Grid, ci: wp.int32, cj: wp.int32, hx: V2, hy: V2) -> F:
         """Largest volume strain of a gap [-]: it cannot exceed what the points around leave free."""
+        filling = F(0.0)
+        for k in range(2):
+            for m in range(2):
+                i = ci - 1 + k
+                j = cj - 1 + m
+                filling += hx[k] * hy[m] * grid.corner[i, j][0] * grid.corner_room[i, j]
         return -wp.log(wp.clamp(filling, F(1.0e-12), F(1.0)))
 
     @wp.kernel(module=module)
@@ -119,7 +118,10 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             liquid_divergence = points.liquid_divergence[p]
         smooth_excess = F(0.0)
         smooth_residual = F(0.0)
-        filling = F(0.0)
+        ci = wp.int32(0)
+        cj = wp.int32(0)
+        hx = V2()
+        hy = V2()
         if CORNERS:
             sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
             sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
@@ -135,9 +137,6 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                     j = cj - 1 + m
                     corner = grid.corner[i, j]
                     h = hx[k] * hy[m]
-                    if GAP_BOUND:
-                        filling += h * corner[0] * grid.corner_room[i, j]
-                    h = h / wp.max(corner[0], F(1.0e-30))
                     smooth += h * corner[1]
                     if TWO_PHASE:
                         smooth_liquid += h * corner[4]
@@ -147,6 +146,14 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             if SMOOTHING:
                 divergence = smooth
                 liquid_divergence = smooth_liquid
+
+        if VISCOSITY:
+            # Artificial, linear (Landshoff), on compression only: keeps a front of sound from ringing.
+            mixture = divergence
+            if TWO_PHASE:
+                n = parameters.porosity
+                mixture = (F(1.0) - n) * divergence + n * liquid_divergence
+            points.viscous_pressure[p] = -parameters.bulk_viscosity * wp.min(mixture, F(0.0))
 
         volume_strain = divergence * time_step
         borne = volume_strain
@@ -162,7 +169,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             gap += opening
             if GAP_BOUND:
                 if gap > F(0.0):
-                    gap = wp.min(gap, room(filling))
+                    gap = wp.min(gap, room(grid, ci, cj, hx, hy))
             points.solid_gap[p] = gap
             points.deviatoric_strain[p] += deviatoric
             points.volume[p] = points.volume[p] * (F(1.0) + borne - opening)
@@ -196,7 +203,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                     )
             if GAP_BOUND:
                 if strain > F(0.0):
-                    strain = wp.min(strain, room(filling) / parameters.porosity)
+                    strain = wp.min(strain, room(grid, ci, cj, hx, hy) / parameters.porosity)
             points.liquid_strain[p] = strain
 
         if FLIP:

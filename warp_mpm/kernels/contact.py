@@ -15,6 +15,7 @@ import warp as wp
 from .layout import (
     BARRIER_VELOCITY,
     BLOCK,
+    CEILING,
     GRID_SHIFT,
     GROUND,
     LEFT_WALL,
@@ -24,7 +25,8 @@ from .layout import (
 
 
 def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build those of the kernels `ground` (workers on the blocks in use), `side_walls` (over rows), `collect` and `barrier` (over
+    """Build those of the kernels `ground` (workers on the blocks in use), `side_walls` (over rows), `ceiling` (over
+    columns), `collect` and `barrier` (over
     contacts) that are called for, and the functions `respond` and `impulse` for the barrier's equation of motion."""
     effects = types.effects
     F = types.scalar
@@ -228,6 +230,23 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                 )
 
         kernels["side_walls"] = side_walls
+
+    if effects.ceiling:
+
+        @wp.kernel(module=module)
+        def ceiling(
+            grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
+        ):
+            """Smooth wall above, on the line of cell corners nearest to it."""
+            i = wp.tid()
+            time_step = F(clock[wp.static(TIME_STEP)])
+            row = parameters.ceiling_row
+            down = V2(F(0.0), F(-1.0))
+            none = F(0.0)
+            fixed_surface(grid, parameters, i, row + 1, i, row, down, none, time_step, wp.static(CEILING), reactions)
+            fixed_surface(grid, parameters, i, row + 2, i, row + 2, down, none, time_step, wp.static(CEILING), reactions)
+
+        kernels["ceiling"] = ceiling
 
     if effects.barrier != "none":
 

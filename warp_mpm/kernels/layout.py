@@ -69,7 +69,8 @@ BACK = 2
 GROUND = 3
 LEFT_WALL = 4
 RIGHT_WALL = 5
-SURFACES = 6
+CEILING = 6
+SURFACES = 7
 
 # Ledger sums, a float64 array written by the ledger kernel.
 LEDGER_KINETIC = 0
@@ -134,6 +135,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["liquid_strain"] = array(dtype=scalar)
     if effects.pressure_relaxation:
         points["pressure_residual"] = array(dtype=scalar)
+    if effects.bulk_viscosity:
+        points["viscous_pressure"] = array(dtype=scalar)
     if effects.two_phase:
         points["liquid_divergence"] = array(dtype=scalar)
 
@@ -174,8 +177,25 @@ def layout(effects: Effects) -> SimpleNamespace:
         "largest_stable_step": wp.float64,
         "pic_rate": scalar,
     }
+    if effects.bulk_viscosity:
+        parameters["bulk_viscosity"] = scalar  # pressure per rate of compression [Pa s]
     if effects.plasticity:
-        for name in ("sin_friction", "sin_dilatancy", "cohesion_term", "tension_limit"):
+        for name in (
+            "yield_plus",
+            "yield_minus",
+            "cohesion_term",
+            "tension_limit",
+            "plane_inverse",
+            "upper_own",
+            "upper_cross",
+            "upper_ratio",
+            "lower_own",
+            "lower_cross",
+            "lower_ratio",
+            "flow_up",
+            "flow_side",
+            "flow_down",
+        ):
             parameters[name] = scalar
     if effects.liquid:
         for name in (
@@ -198,6 +218,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.side_walls:
         parameters["left_wall"] = scalar  # position [m]; far outside the grid: open
         parameters["right_wall"] = scalar
+    if effects.ceiling:
+        parameters["ceiling_row"] = wp.int32  # last row of nodes below the upper wall
     if effects.barrier == "sliding":
         parameters["barrier_mass"] = wp.float64
         parameters["barrier_weight"] = wp.float64

@@ -1,5 +1,6 @@
 """Mohr-Coulomb plasticity with tension cut-off: return mapping in principal stress, sigma_zz included."""
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,72 +19,50 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
     where T is at most the apex c cot phi, so that the apex of the cone is the apex of the cut-off. Regions: plane, two
     edges, one, two or three tension planes, cone and cut-off together with their two corners.
 
-    The function takes the trial stress (xx, yy, zz, xy) [Pa], the Lame constant and shear modulus [Pa], sin phi,
-    sin psi, 2 c cos phi and T [Pa]; it returns the stress on or inside the surface and the opening, the plastic volume
-    strain due to the cut-off alone [-].
+    The function takes the trial stress (xx, yy, zz, xy) [Pa] and `parameters`, whose fields `yield_constants` makes; it
+    returns the stress on or inside the surface and the opening, the plastic volume strain due to the cut-off alone [-].
+    Where most points yield, branches cost more than arithmetic: the cone is free of them.
     """
     F = types.scalar
     V3 = types.V3
     V4 = types.V4
+    Parameters = types.Parameters
 
     @wp.func
-    def cone(s: V3, lame: F, shear: F, sin_friction: F, sin_dilatancy: F, cohesion: F) -> V3:
-        one = F(1.0)
-        coupled = F(4.0) * lame * sin_friction * sin_dilatancy
-        f = (one + sin_friction) * s[0] - (one - sin_friction) * s[2] - cohesion
-        plane = coupled + F(4.0) * shear * (one + sin_friction * sin_dilatancy)
-        dilation = F(2.0) * lame * sin_dilatancy
-        up = dilation + F(2.0) * shear * (one + sin_dilatancy)
-        down = dilation - F(2.0) * shear * (one - sin_dilatancy)
-        multiplier = wp.max(f, F(0.0)) / plane
-        r = V3(s[0] - multiplier * up, s[1] - multiplier * dilation, s[2] - multiplier * down)
-        if r[1] > r[0]:
-            # Edge s1 = s2: planes (1, 3) and (2, 3).
-            g = (one + sin_friction) * s[1] - (one - sin_friction) * s[2] - cohesion
-            cross = coupled + F(2.0) * shear * (one - sin_friction) * (one - sin_dilatancy)
-            scale = one / (plane * plane - cross * cross)
-            a = (plane * f - cross * g) * scale
-            b = (plane * g - cross * f) * scale
-            top = F(0.5) * (s[0] + s[1] - (a + b) * (up + dilation))
-            r = V3(top, top, s[2] - (a + b) * down)
-        elif r[2] > r[1]:
-            # Edge s2 = s3: planes (1, 3) and (1, 2).
-            g = (one + sin_friction) * s[0] - (one - sin_friction) * s[1] - cohesion
-            cross = coupled + F(2.0) * shear * (one + sin_friction) * (one + sin_dilatancy)
-            scale = one / (plane * plane - cross * cross)
-            a = (plane * f - cross * g) * scale
-            b = (plane * g - cross * f) * scale
-            low = F(0.5) * (s[1] + s[2] - (a + b) * (down + dilation))
-            r = V3(s[0] - (a + b) * up, low, low)
-        return r
+    def cone(s: V3, y: Parameters) -> V3:
+        f = wp.max(y.yield_plus * s[0] - y.yield_minus * s[2] - y.cohesion_term, F(0.0))
+        upper = y.yield_plus * s[1] - y.yield_minus * s[2] - y.cohesion_term
+        lower = y.yield_plus * s[0] - y.yield_minus * s[1] - y.cohesion_term
+        # Plastic multipliers of the planes (2, 3) and (1, 2), positive on the edges s1 = s2 and s2 = s3, and of (1, 3).
+        m23 = wp.max(upper * y.upper_own - f * y.upper_cross, F(0.0))
+        m12 = wp.max(lower * y.lower_own - f * y.lower_cross, F(0.0))
+        m13 = f * y.plane_inverse - m23 * y.upper_ratio - m12 * y.lower_ratio
+        return V3(
+            s[0] - (m13 + m12) * y.flow_up - m23 * y.flow_side,
+            s[1] - m13 * y.flow_side - m23 * y.flow_up - m12 * y.flow_down,
+            s[2] - (m13 + m23) * y.flow_down - m12 * y.flow_side,
+        )
 
     @wp.func
-    def cut_off(
-        s: V3, lame: F, shear: F, sin_friction: F, sin_dilatancy: F, cohesion: F, limit: F
-    ) -> V3:
-        one = F(1.0)
-        stiff = lame + F(2.0) * shear
+    def cut_off(s: V3, y: Parameters) -> V3:
+        stiff = y.lame + F(2.0) * y.shear_modulus
+        limit = y.tension_limit
         excess = (s[0] - limit) / stiff
-        r = V3(limit, s[1] - lame * excess, s[2] - lame * excess)
+        r = V3(limit, s[1] - y.lame * excess, s[2] - y.lame * excess)
         if r[1] > limit:
-            both = (s[0] + s[1] - F(2.0) * limit) / (F(2.0) * (lame + shear))
-            r = V3(limit, limit, wp.min(s[2] - lame * both, limit))
-        if (one + sin_friction) * limit - (one - sin_friction) * r[2] > cohesion:
+            both = (s[0] + s[1] - F(2.0) * limit) / (F(2.0) * (y.lame + y.shear_modulus))
+            r = V3(limit, limit, wp.min(s[2] - y.lame * both, limit))
+        if y.yield_plus * limit - y.yield_minus * r[2] > y.cohesion_term:
             # Cut-off and cone together: s1 and s3 are known, s2 follows from elasticity, unless it meets a corner.
-            low = ((one + sin_friction) * limit - cohesion) / (one - sin_friction)
-            dilation = F(2.0) * lame * sin_dilatancy
-            up = dilation + F(2.0) * shear * (one + sin_dilatancy)
-            down = dilation - F(2.0) * shear * (one - sin_dilatancy)
-            inverse = one / (stiff * down - lame * up)
-            a = ((s[0] - limit) * down - (s[2] - low) * up) * inverse
-            m = (stiff * (s[2] - low) - lame * (s[0] - limit)) * inverse
-            r = V3(limit, wp.clamp(s[1] - lame * a - dilation * m, low, limit), low)
+            low = (y.yield_plus * limit - y.cohesion_term) / y.yield_minus
+            inverse = F(1.0) / (stiff * y.flow_down - y.lame * y.flow_up)
+            a = ((s[0] - limit) * y.flow_down - (s[2] - low) * y.flow_up) * inverse
+            m = (stiff * (s[2] - low) - y.lame * (s[0] - limit)) * inverse
+            r = V3(limit, wp.clamp(s[1] - y.lame * a - y.flow_side * m, low, limit), low)
         return r
 
     @wp.func
-    def return_mapping(
-        stress: V4, lame: F, shear: F, sin_friction: F, sin_dilatancy: F, cohesion: F, limit: F
-    ):
+    def return_mapping(stress: V4, y: Parameters):
         half = F(0.5)
         mean = half * (stress[0] + stress[1])
         difference = half * (stress[0] - stress[1])
@@ -93,34 +72,54 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
         z = stress[2]
         first = wp.max(a, z)
         last = wp.min(b, z)
-        result = stress
+        s = V3(first, a + b + z - first - last, last)
+        r = cone(s, y)
         opening = F(0.0)
-        outside = (F(1.0) + sin_friction) * first - (F(1.0) - sin_friction) * last > cohesion
-        if outside or first > limit:
-            s = V3(first, a + b + z - first - last, last)
-            r = cone(s, lame, shear, sin_friction, sin_dilatancy, cohesion)
-            if r[0] > limit:
-                r = cut_off(s, lame, shear, sin_friction, sin_dilatancy, cohesion, limit)
-                opening = (s[0] + s[1] + s[2] - r[0] - r[1] - r[2]) / (F(3.0) * lame + F(2.0) * shear)
-            # z keeps its rank among the principal stresses.
-            new_a = r[0]
-            new_b = r[1]
-            new_z = r[2]
-            if z > a:
-                new_z = r[0]
-                new_a = r[1]
-                new_b = r[2]
-            elif z > b:
-                new_z = r[1]
-                new_b = r[2]
-            cosine = F(1.0)
-            sine = F(0.0)
-            if radius > F(0.0):
-                cosine = difference / radius
-                sine = stress[3] / radius
-            mean = half * (new_a + new_b)
-            radius = half * (new_a - new_b)
-            result = V4(mean + radius * cosine, mean - radius * cosine, new_z, radius * sine)
-        return result, opening
+        if r[0] > y.tension_limit:
+            r = cut_off(s, y)
+            opening = (s[0] + s[1] + s[2] - r[0] - r[1] - r[2]) / (F(3.0) * y.bulk_modulus)
+        # z keeps its rank among the principal stresses.
+        new_z = wp.where(z > a, r[0], wp.where(z > b, r[1], r[2]))
+        new_a = wp.where(z > a, r[1], r[0])
+        new_b = wp.where(z > b, r[2], r[1])
+        inverse = F(1.0) / wp.max(radius, F(1.0e-30))
+        centre = half * (new_a + new_b)
+        scale = half * (new_a - new_b) * inverse
+        return V4(centre + scale * difference, centre - scale * difference, new_z, scale * stress[3]), opening
 
     return return_mapping
+
+
+def yield_constants(
+    *,
+    lame: float,
+    shear_modulus: float,
+    friction_angle: float,
+    dilatancy_angle: float,
+    cohesion: float,
+    tension_cutoff: float,
+) -> dict[str, float]:
+    """Fields of the kernels' parameters that the return mapping reads. Moduli, cohesion, cut-off in Pa, angles in rad."""
+    sine, sine_flow = math.sin(friction_angle), math.sin(dilatancy_angle)
+    coupled = 4.0 * lame * sine * sine_flow
+    plane = coupled + 4.0 * shear_modulus * (1.0 + sine * sine_flow)
+    upper = coupled + 2.0 * shear_modulus * (1.0 - sine) * (1.0 - sine_flow)
+    lower = coupled + 2.0 * shear_modulus * (1.0 + sine) * (1.0 + sine_flow)
+    side = 2.0 * lame * sine_flow
+    apex = cohesion / math.tan(friction_angle) if friction_angle > 0.0 else math.inf
+    return {
+        "yield_plus": 1.0 + sine,
+        "yield_minus": 1.0 - sine,
+        "cohesion_term": 2.0 * cohesion * math.cos(friction_angle),
+        "tension_limit": min(tension_cutoff, apex),
+        "plane_inverse": 1.0 / plane,
+        "upper_own": plane / (plane**2 - upper**2),
+        "upper_cross": upper / (plane**2 - upper**2),
+        "upper_ratio": upper / plane,
+        "lower_own": plane / (plane**2 - lower**2),
+        "lower_cross": lower / (plane**2 - lower**2),
+        "lower_ratio": lower / plane,
+        "flow_up": side + 2.0 * shear_modulus * (1.0 + sine_flow),
+        "flow_side": side,
+        "flow_down": side - 2.0 * shear_modulus * (1.0 - sine_flow),
+    }

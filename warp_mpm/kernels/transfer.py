@@ -35,6 +35,7 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
+    VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
     EXPLICIT_DRAG = effects.drag == "explicit"
 
@@ -134,6 +135,8 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             pressure = wp.max(
                 -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
             )
+        if VISCOSITY:
+            pressure += points.viscous_pressure[p]
         solid_pressure = pressure
         liquid_force = F(0.0)
         if TWO_PHASE:
@@ -318,4 +321,27 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                     else:
                         grid.corner[ci - 1 + k, cj - 1 + m] += S(h, h * divergence)
 
-    return SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
+    kernels = SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
+
+    if CORNERS:
+
+        @wp.kernel(module=module)
+        def average(grid: Grid, parameters: Parameters):
+            """Turn the corners' sums into means, each once."""
+            worker = wp.tid()
+            for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+                block = grid.active[s / wp.static(BLOCK)]
+                bi = block / parameters.block_rows
+                bj = block - bi * parameters.block_rows
+                i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+                for b in range(wp.static(BLOCK)):
+                    j = bj * wp.static(BLOCK) + b
+                    corner = grid.corner[i, j]
+                    if corner[0] > F(0.0):
+                        mean = corner / corner[0]
+                        mean[0] = corner[0]
+                        grid.corner[i, j] = mean
+
+        kernels.average = average
+
+    return kernels
