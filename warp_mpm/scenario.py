@@ -492,7 +492,7 @@ class Numerics(_Model):
     """Side of the square cells of the background grid."""
     points_per_cell: Literal[1, 4, 9, 16] = 4
     """Material points in a full cell at t = 0."""
-    courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.7
+    courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Share of the critical time step that is used, C_NB."""
     transfer: Literal["flip", "apic"] = "apic"
     """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, as the paper)."""
