@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import json
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -322,7 +322,7 @@ class Simulation:
 
         Raises:
             ValueError: `until` lies in the past or is not finite.
-            SimulationDiverged: a velocity is no longer finite or sensible.
+            SimulationDiverged: a quantity is no longer finite or sensible.
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
@@ -334,10 +334,39 @@ class Simulation:
             self._graph = capture.graph
         wp.capture_launch(self._graph)
         if int(self._counters.numpy()[at.DIVERGED]):
-            raise SimulationDiverged(
-                f"The run diverged at t = {self.time:.6g} s, step {self.steps}: a speed above {at.FASTEST:g} m/s or not "
-                "a number. Try a smaller numerics.courant_number or a finer numerics.spacing_m."
-            )
+            raise SimulationDiverged(self._what_diverged())
+
+    def _what_diverged(self) -> str:
+        """When, which quantity, where, and what to try."""
+        names = {
+            "velocity": "the velocity",
+            "stress": "the effective stress",
+            "liquid_strain": "the pore pressure",
+            "volume": "the volume",
+            "position": "the position",
+        }
+        arrays = {name: self._point_arrays[name].numpy() for name in names if name in self._point_arrays}
+        found, place = "", None
+        for name, values in arrays.items():
+            bad = ~np.isfinite(values.reshape(self.material_points, -1)).all(axis=1)
+            if bad.any():
+                known = arrays["position"][bad & np.isfinite(arrays["position"]).all(axis=1)]
+                found = f"{names[name]} of {bad.sum()} of {self.material_points} material points is not a finite number"
+                place = known[0] if len(known) else None
+                break
+        if not found:
+            speed = np.abs(arrays["velocity"]).max(axis=1)
+            fastest = int(speed.argmax())
+            found = f"the speed of a material point passed {at.FASTEST:g} m/s"
+            place = arrays["position"][fastest]
+            if speed[fastest] < 0.1 * at.FASTEST:
+                found, place = f"the barrier's velocity is {self.barrier_velocity:g} m/s", None
+        where = "" if place is None else f", near x = {place[0]:.3g} m, y = {place[1]:.3g} m"
+        return (
+            f"The run diverged at t = {self.time:.6g} s (step {self.steps}): {found}{where}. Try a smaller "
+            f"numerics.courant_number (now {self.scenario.numerics.courant_number:g}) or a finer numerics.spacing_m "
+            f"(now {self.scenario.numerics.spacing_m:g})."
+        )
 
     def set_points(self, **state: NDArray[np.float64]) -> None:
         """Replace part of the initial state; only before the first step.
@@ -449,10 +478,15 @@ class Simulation:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval).
 
         Keys without the effect they belong to are absent.
+
+        Raises:
+            SimulationDiverged: some quantity of a material point is not a finite number.
         """
         self._sums.zero_()
         self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
         sums = self._sums.numpy()
+        if sums[at.LEDGER_NOT_FINITE] > 0.0:
+            raise SimulationDiverged(self._what_diverged())
         totals = self._totals()
         clock, reactions = totals.clock, totals.reactions
         elapsed = clock[at.TIME] - self._last.clock[at.TIME]
@@ -548,23 +582,37 @@ class Simulation:
         return arrays
 
     def save_state(self) -> bytes:
-        """Everything that the run needs to go on, bit for bit (on the CPU)."""
-        stream = io.BytesIO()
-        state = {name: array.numpy() for name, array in self._state_arrays().items()}
-        state["last.clock"], state["last.reactions"] = self._last.clock, self._last.reactions
-        np.savez(stream, **state)
-        return stream.getvalue()
+        """Everything that the run needs to go on, bit for bit (on the CPU): a line of JSON that lists the arrays, then
+        their numbers."""
+        state = self._state()
+        listed = [[name, values.dtype.str, list(values.shape)] for name, values in state.items()]
+        return json.dumps(listed).encode() + b"\n" + b"".join(values.tobytes() for values in state.values())
 
     def restore_state(self, data: bytes) -> None:
         """Go back to a state from `save_state` of a simulation of the same scenario.
 
         Raises:
-            ValueError: the state belongs to another scene.
+            ValueError: the state belongs to another scene or is damaged; nothing was changed.
         """
-        with np.load(io.BytesIO(data), allow_pickle=False) as state:
-            for name, array in self._state_arrays().items():
-                if name not in state or state[name].shape != array.numpy().shape:
-                    raise ValueError(f"the state does not fit this scenario: {name} is missing or of another size")
-            for name, array in self._state_arrays().items():
-                array.assign(state[name])
-            self._last = SimpleNamespace(clock=state["last.clock"], reactions=state["last.reactions"])
+        listed, _, numbers = data.partition(b"\n")
+        state = self._state()
+        expected = [[name, values.dtype.str, list(values.shape)] for name, values in state.items()]
+        if listed != json.dumps(expected).encode():
+            raise ValueError("the state does not fit this scenario: its arrays are others, or of other sizes")
+        if len(numbers) != sum(values.nbytes for values in state.values()):
+            raise ValueError("the state is damaged: it is not as long as its arrays")
+        arrays, begin = self._state_arrays(), 0
+        for name, now in state.items():
+            values = np.frombuffer(numbers, now.dtype, now.size, begin).reshape(now.shape)
+            begin += now.nbytes
+            if name in arrays:
+                arrays[name].assign(values)
+            else:
+                state[name] = values.copy()
+        self._initial_momentum = state["initial_momentum"]
+        self._last = SimpleNamespace(clock=state["last.clock"], reactions=state["last.reactions"])
+
+    def _state(self) -> dict[str, NDArray[Any]]:
+        state = {name: array.numpy() for name, array in self._state_arrays().items()}
+        kept = {"last.clock": self._last.clock, "last.reactions": self._last.reactions}
+        return state | kept | {"initial_momentum": np.asarray(self._initial_momentum, dtype=np.float64)}

@@ -5,12 +5,15 @@ from types import SimpleNamespace
 import warp as wp
 
 from .layout import (
+    BARRIER_VELOCITY,
+    DIVERGED,
     GRID_SHIFT,
     LEFT_ENERGY,
     LEFT_LIQUID_MASS,
     LEFT_MOMENTUM_X,
     LEFT_MOMENTUM_Y,
     LEFT_SOLID_MASS,
+    OLD_BARRIER_VELOCITY,
     POINTS_LEFT,
     TIME_STEP,
 )
@@ -37,6 +40,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
+    MOVING = effects.barrier in ("sliding", "driven")
     GAP_BOUND = effects.gap_record and effects.smoothing_grid
 
     @wp.func
@@ -206,6 +210,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                     strain = wp.min(strain, room(grid, ci, cj, hx, hy) / parameters.porosity)
             points.liquid_strain[p] = strain
 
+        before = x
         if FLIP:
             x += time_step * points.advection[p]
         else:
@@ -213,6 +218,10 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             x += time_step * V2(v[0], v[1])
         points.position[p] = x
 
+        # The grid as it will lie in the next step: whatever a barrier's speed, no point then reaches beyond it.
+        if MOVING:
+            middle = F(0.5) * (F(clock[wp.static(BARRIER_VELOCITY)]) + F(clock[wp.static(OLD_BARRIER_VELOCITY)]))
+            shift += time_step * middle
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         margin = F(2.0)
@@ -223,6 +232,11 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             and sy < F(parameters.rows) - margin
         )
         if not within:
+            # A position that is no number compares false above; such a point has not left, the run has diverged.
+            if not (wp.isfinite(x[0]) and wp.isfinite(x[1])):
+                points.position[p] = before
+                counters[wp.static(DIVERGED)] = 1
+                return
             points.inside[p] = 0
             reference = points.reference_volume[p]
             v = points.velocity[p]

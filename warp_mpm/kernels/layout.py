@@ -83,7 +83,9 @@ LEDGER_SOLID_MASS = 6
 LEDGER_LIQUID_MASS = 7
 LEDGER_SPEED_MAX = 8
 LEDGER_PRESSURE_UPSTREAM = 9
-LEDGER_SIZE = 10
+LEDGER_NOT_FINITE = 10
+"""Material points of which some quantity is not a finite number."""
+LEDGER_SIZE = 11
 
 # What left the domain, a float64 array.
 LEFT_SOLID_MASS = 0

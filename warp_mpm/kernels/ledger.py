@@ -12,6 +12,7 @@ from .layout import (
     LEDGER_MOMENTUM_X,
     LEDGER_MOMENTUM_Y,
     GRID_SHIFT,
+    LEDGER_NOT_FINITE,
     LEDGER_PRESSURE_MAX,
     LEDGER_PRESSURE_UPSTREAM,
     LEDGER_SOLID_MASS,
@@ -61,7 +62,10 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
         elastic = volume * (
             trace * trace / (F(18.0) * parameters.bulk_modulus) + deviatoric / (F(4.0) * parameters.shear_modulus)
         )
+        sound = wp.isfinite(squares) and wp.isfinite(volume) and wp.isfinite(speed)
         if LIQUID:
+            # Taken before the pressure's own maximum, which passes over what is no number.
+            sound = sound and wp.isfinite(points.liquid_strain[p])
             pressure = wp.max(
                 -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
             )
@@ -72,6 +76,8 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
             if BARRIER:
                 if wp.float64(points.position[p][0]) < parameters.crest_end + clock[wp.static(GRID_SHIFT)]:
                     wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_UPSTREAM), wp.float64(pressure))
+        if not sound:
+            wp.atomic_add(sums, wp.static(LEDGER_NOT_FINITE), wp.float64(1.0))
         wp.atomic_add(sums, wp.static(LEDGER_KINETIC), wp.float64(F(0.5) * kinetic))
         wp.atomic_add(
             sums,

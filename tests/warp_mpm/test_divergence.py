@@ -1,0 +1,79 @@
+"""A run that leaves the range of sense is noticed within one output interval, and says when, where and what."""
+
+import numpy as np
+import pytest
+
+from warp_mpm.simulation import Simulation, SimulationDiverged
+
+
+@pytest.fixture
+def simulation(coarse_case_1):
+    simulation = Simulation(coarse_case_1)
+    simulation.advance(0.02)
+    return simulation
+
+
+def spoil(simulation, name, value, point=100):
+    array = simulation._point_arrays[name]
+    values = array.numpy()
+    values[point] = value
+    array.assign(values)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "quantity"),
+    [
+        ("velocity", np.nan, "the velocity"),
+        ("velocity", np.inf, "the velocity"),
+        ("velocity", 1e6, "the speed"),
+        ("stress", np.nan, "the velocity"),  # the forces carry it to the velocities within the step
+        ("stress", -np.inf, "the velocity"),
+        ("liquid_strain", np.nan, "the pore pressure"),
+        ("volume", np.nan, "the velocity"),
+    ],
+)
+def test_noticed_within_one_interval(simulation, name, value, quantity):
+    spoil(simulation, name, value)
+    with pytest.raises(SimulationDiverged, match=quantity) as caught:
+        simulation.advance(0.025)
+        simulation.sample()
+    sentence = str(caught.value)
+    assert "diverged at t = 0.02" in sentence
+    assert "near x = " in sentence
+    assert "numerics.courant_number (now 0.95)" in sentence
+    if value != 1e6:
+        assert "near x = -1" in sentence
+        assert simulation.record["points_left"] == 0  # it has not left the domain in silence
+
+
+def test_a_barrier_at_any_speed_keeps_the_flow_on_the_grid(load_scene):
+    """At 3 km/s the grid, which rides with the barrier, passes several of its cells in a step."""
+    motion = {"kind": "prescribed", "times_s": [0.0, 0.02], "velocities_m_per_s": [0.0, 3000.0]}
+    simulation = Simulation(load_scene("case_1", **{"numerics.spacing_m": 0.5, "barrier.motion": motion}))
+    for time in np.linspace(0.01, 0.1, 10):
+        simulation.advance(time)
+        sample = simulation.sample()
+        assert sample["solid_mass"] + sample["liquid_mass"] + sample["left_mass"] == pytest.approx(81_000, rel=1e-12)
+    assert simulation.record["points_left"] == simulation.material_points
+
+
+def test_a_state_goes_back_and_on_bit_for_bit(coarse_case_1, simulation):
+    state = simulation.save_state()
+    simulation.advance(0.5)
+    expected = simulation.save_state()
+    other = Simulation(coarse_case_1)
+    for again in (other, simulation):
+        again.restore_state(state)
+        again.advance(0.5)
+        assert again.save_state() == expected
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [lambda state: state[:-1], lambda state: state + b"0", lambda state: b"", lambda state: state.replace(b"f8", b"f4")],
+)
+def test_a_spoilt_state_changes_nothing(simulation, spoilt):
+    state = simulation.save_state()
+    with pytest.raises(ValueError, match=r"the state (is damaged|does not fit this scenario)"):
+        simulation.restore_state(spoilt(state))
+    assert simulation.save_state() == state
