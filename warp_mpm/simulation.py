@@ -306,6 +306,8 @@ class Simulation:
         if effects.smoothing_grid:
             self._launch("average", self._workers, grid, parameters)
         self._launch("update", count, points, grid, parameters, clock, self._counters, self._left)
+        if effects.plasticity:
+            self._launch("plasticity", count, points, parameters)
         self._launch(
             "tick", 1, parameters, clock, self._counters, self._running, self._reactions, self._left, self._times,
             self._velocities,

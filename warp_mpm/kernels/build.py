@@ -19,11 +19,18 @@ from .shape_functions import make_shape_functions
 from .transfer import make_transfer
 
 
+CPU_COMPILER_FLAGS = (
+    "-march=native -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000 -ffp-contract=fast"
+)
+"""Warp's own flags without its bound on the depth of vectorisation, and with fused multiply-add: docs/performance.md."""
+
+
 @cache
 def build_kernels(effects: Effects) -> SimpleNamespace:
     """Kernels for `effects`, and no others, in a Warp module of their own."""
     module = effects.module_name
-    wp.set_module_options({"enable_backward": False}, module=wp.get_module(module))
+    options = {"enable_backward": False, "cpu_compiler_flags": CPU_COMPILER_FLAGS}
+    wp.set_module_options(options, module=wp.get_module(module))
     types = layout(effects)
     shapes = make_shape_functions(types)
     transfer = make_transfer(types, shapes, module)
@@ -34,7 +41,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         types=types,
         move=momentum.move,
         **transfer.__dict__,
-        update=constitutive.update,
+        **constitutive.__dict__,
         start=clock.start,
         tick=clock.tick,
         ledger=make_ledger(types, module).ledger,

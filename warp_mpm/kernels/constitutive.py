@@ -21,16 +21,16 @@ from .mohr_coulomb import make_return_mapping
 
 
 def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernel `update` (over points) and the function `stress_update` (also used by the element driver)."""
+    """Build the kernels `update` and, if called for, `plasticity` (over points)."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2
     V4 = types.V4
+    S = types.S
     Points = types.Points
     Grid = types.Grid
     Parameters = types.Parameters
     hats = shapes.hats
-    return_mapping = make_return_mapping(types)
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -44,12 +44,12 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
     GAP_BOUND = effects.gap_record and effects.smoothing_grid
 
     @wp.func
-    def stress_update(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
-        """Jaumann rate of the Kirchhoff stress, Eq. (A3), then the return mapping.
+    def trial_stress(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
+        """Jaumann rate of the Kirchhoff stress, Eq. (A3), for an elastic step.
 
         `gradient` is (dvx/dx, dvx/dy, dvy/dx, dvy/dy) [1/s]; `volume_strain` the increment that the skeleton bears [-],
-        which replaces the trace. Returns the stress, the opening [-] and the deviatoric strain increment [-]. The
-        rotation is the exact one of the spin over the step (half-angle formula), so that it leaves invariants alone.
+        which replaces the trace. Returns the stress and the deviatoric strain increment [-]. The rotation is the exact
+        one of the spin over the step (half-angle formula), so that it leaves invariants alone.
         """
         half = F(0.5)
         third = volume_strain / F(3.0)
@@ -62,10 +62,12 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
         scale = F(1.0) / (F(1.0) + tangent * tangent)
         c = (F(1.0) - tangent * tangent) * scale
         s = F(2.0) * tangent * scale
+        cosine = c * c - s * s
+        sine = F(2.0) * c * s
         centre = half * (stress[0] + stress[1])
         difference = half * (stress[0] - stress[1])
-        turned_difference = difference * (c * c - s * s) - F(2.0) * c * s * stress[3]
-        turned_shear = F(2.0) * c * s * difference + (c * c - s * s) * stress[3]
+        turned_difference = difference * cosine - sine * stress[3]
+        turned_shear = sine * difference + cosine * stress[3]
         keep = F(1.0) - volume_strain
         lame = parameters.lame * volume_strain
         double = F(2.0) * parameters.shear_modulus
@@ -75,29 +77,12 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             keep * stress[2] + lame,
             keep * turned_shear + double * xy,
         )
-        deviatoric = wp.sqrt(
-            F(2.0 / 3.0)
-            * (
-                (xx - third) * (xx - third)
-                + (yy - third) * (yy - third)
-                + third * third
-                + F(2.0) * xy * xy
-            )
-        )
-        opening = F(0.0)
-        if PLASTICITY:
-            trial, opening = return_mapping(trial, parameters)
-        return trial, opening, deviatoric
+        squares = (xx - third) * (xx - third) + (yy - third) * (yy - third) + third * third + F(2.0) * xy * xy
+        return trial, wp.sqrt(F(2.0 / 3.0) * squares)
 
     @wp.func
-    def room(grid: Grid, ci: wp.int32, cj: wp.int32, hx: V2, hy: V2) -> F:
+    def room(filling: F) -> F:
         """Largest volume strain of a gap [-]: it cannot exceed what the points around leave free."""
-        filling = F(0.0)
-        for k in range(2):
-            for m in range(2):
-                i = ci - 1 + k
-                j = cj - 1 + m
-                filling += hx[k] * hy[m] * grid.corner[i, j][0] * grid.corner_room[i, j]
         return -wp.log(wp.clamp(filling, F(1.0e-12), F(1.0)))
 
     @wp.kernel(module=module)
@@ -122,10 +107,8 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             liquid_divergence = points.liquid_divergence[p]
         smooth_excess = F(0.0)
         smooth_residual = F(0.0)
-        ci = wp.int32(0)
-        cj = wp.int32(0)
-        hx = V2()
-        hy = V2()
+        filling = F(0.0)
+        least_filling = F(1.0)
         if CORNERS:
             sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
             sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
@@ -133,23 +116,21 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             cj = wp.int32(sy)
             hx = hats(sx - F(ci))
             hy = hats(sy - F(cj))
-            smooth = F(0.0)
-            smooth_liquid = F(0.0)
+            smooth = S()
             for k in range(2):
                 for m in range(2):
-                    i = ci - 1 + k
-                    j = cj - 1 + m
-                    corner = grid.corner[i, j]
-                    h = hx[k] * hy[m]
-                    smooth += h * corner[1]
-                    if TWO_PHASE:
-                        smooth_liquid += h * corner[4]
+                    corner = grid.corner[ci - 1 + k, cj - 1 + m]
+                    smooth += (hx[k] * hy[m]) * corner
                     if RELAXATION:
-                        smooth_excess += h * corner[2]
-                        smooth_residual += h * corner[3]
+                        least_filling = wp.min(least_filling, corner[0])
+            filling = smooth[0]
             if SMOOTHING:
-                divergence = smooth
-                liquid_divergence = smooth_liquid
+                divergence = smooth[1]
+                if TWO_PHASE:
+                    liquid_divergence = smooth[4]
+            if RELAXATION:
+                smooth_excess = smooth[2]
+                smooth_residual = smooth[3]
 
         if VISCOSITY:
             # Artificial, linear (Landshoff), on compression only: keeps a front of sound from ringing.
@@ -164,24 +145,16 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
         if PLASTICITY:
             # A skeleton that has opened bears nothing until the gap has closed.
             gap = points.solid_gap[p]
-            if borne < F(0.0):
-                closed = wp.min(gap, -borne)
-                gap -= closed
+            if gap > F(0.0):
+                if GAP_BOUND:
+                    gap = wp.min(gap, room(filling))
+                closed = wp.min(gap, wp.max(-borne, F(0.0)))
                 borne += closed
-            stress, opening, deviatoric = stress_update(points.stress[p], gradient, borne, time_step, parameters)
-            points.stress[p] = stress
-            gap += opening
-            if GAP_BOUND:
-                if gap > F(0.0):
-                    gap = wp.min(gap, room(grid, ci, cj, hx, hy))
-            points.solid_gap[p] = gap
-            points.deviatoric_strain[p] += deviatoric
-            points.volume[p] = points.volume[p] * (F(1.0) + borne - opening)
-        else:
-            stress, opening, deviatoric = stress_update(points.stress[p], gradient, borne, time_step, parameters)
-            points.stress[p] = stress
-            points.deviatoric_strain[p] += deviatoric
-            points.volume[p] = points.volume[p] * (F(1.0) + borne)
+                points.solid_gap[p] = gap - closed
+        stress, deviatoric = trial_stress(points.stress[p], gradient, borne, time_step, parameters)
+        points.stress[p] = stress
+        points.deviatoric_strain[p] += deviatoric
+        points.volume[p] = points.volume[p] * (F(1.0) + borne)
 
         if LIQUID:
             # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
@@ -199,15 +172,17 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                 excess = -parameters.liquid_bulk_modulus * old - parameters.true_liquid_density * wp.dot(
                     parameters.gravity, x
                 )
-                points.pressure_residual[p] = excess - smooth_excess
-                if strain < F(0.0):
+                whole = least_filling > F(0.6)
+                # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
+                points.pressure_residual[p] = wp.where(whole, excess - smooth_excess, F(0.0))
+                if whole and strain < F(0.0):
                     share = wp.min(parameters.relaxation_rate * time_step, F(1.0))
                     strain = wp.min(
                         strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
                     )
             if GAP_BOUND:
                 if strain > F(0.0):
-                    strain = wp.min(strain, room(grid, ci, cj, hx, hy) / parameters.porosity)
+                    strain = wp.min(strain, room(filling) / parameters.porosity)
             points.liquid_strain[p] = strain
 
         before = x
@@ -257,4 +232,23 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             wp.atomic_add(left, wp.static(LEFT_ENERGY), wp.float64(energy))
             wp.atomic_add(counters, wp.static(POINTS_LEFT), 1)
 
-    return SimpleNamespace(update=update, stress_update=stress_update)
+    kernels = SimpleNamespace(update=update)
+
+    if PLASTICITY:
+        return_mapping = make_return_mapping(types)
+
+        @wp.kernel(module=module)
+        def plasticity(points: Points, parameters: Parameters):
+            """Bring the stress back to the yield surface. Apart from `update`, the processor overlaps more points."""
+            p = wp.tid()
+            if points.inside[p] == 0:
+                return
+            stress, opening = return_mapping(points.stress[p], parameters)
+            points.stress[p] = stress
+            if opening > F(0.0):
+                points.solid_gap[p] += opening
+                points.volume[p] = points.volume[p] * (F(1.0) - opening)
+
+        kernels.plasticity = plasticity
+
+    return kernels

@@ -157,7 +157,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["liquid_surplus"] = array(dtype=V2, ndim=2)  # momentum that the liquid alone would have gained beyond
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
-    if effects.gap_record and effects.smoothing_grid:
+    if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
 
     parameters: dict[str, Any] = {

@@ -327,7 +327,7 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
 
         @wp.kernel(module=module)
         def average(grid: Grid, parameters: Parameters):
-            """Turn the corners' sums into means, each once."""
+            """Turn the corners' sums into means, and their volume into the filling: its share of the room there."""
             worker = wp.tid()
             for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
                 block = grid.active[s / wp.static(BLOCK)]
@@ -339,7 +339,7 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                     corner = grid.corner[i, j]
                     if corner[0] > F(0.0):
                         mean = corner / corner[0]
-                        mean[0] = corner[0]
+                        mean[0] = corner[0] * grid.corner_room[i, j]
                         grid.corner[i, j] = mean
 
         kernels.average = average
