@@ -1,0 +1,150 @@
+"""The material points, to scale, with barrier and ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon as PolygonPatch
+from matplotlib.patches import Rectangle
+
+from warp_mpm.fields import Field, colour_limits, field_named, field_values
+from warp_mpm.plotting.style import BARRIER, EDGE, GREY, GROUND
+from warp_mpm.results import Results, ResultsError, Snapshot
+from warp_mpm.scenario import Scenario, Trapezoid
+
+PRESSURE_TIMES = (1.0, 2.0, 4.0)
+"""Times [s] of the paper's Figs. 4 to 6."""
+
+Window = tuple[float, float, float, float]
+"""left, right, bottom, top [m]."""
+
+
+def pore_pressure(results: Results, times: Sequence[float] = PRESSURE_TIMES) -> Figure:
+    """The flow at several times, coloured by pore pressure, a dry one by its speed; see `field_panels`."""
+    wet = "pore_pressure" in results.snapshots.names
+    return field_panels([results], "pore_pressure" if wet else "speed", times)
+
+
+def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] = PRESSURE_TIMES) -> Figure:
+    """The flow at several times, coloured by a field, one column for each run (the paper's Figs. 4 to 6).
+
+    Args:
+        runs: at least one.
+        name: of a field, see `warp_mpm.fields`.
+        times: [s]; those after the end of all runs are left out, and if none is left, the last snapshot is drawn.
+
+    Raises:
+        ResultsError: the snapshots cannot be read, or a run has no such field.
+        ValueError: the field is not known.
+    """
+    field = field_named(name)
+    for results in runs:
+        if len(results.snapshots) == 0:
+            raise ResultsError(f"{results.path} holds no snapshot to draw.")
+    end = max(float(results.snapshots.times[-1]) for results in runs)
+    wanted = [time for time in times if time <= end + 1e-9] or [end]
+    frames = [[results.snapshots.at(time) for time in wanted] for results in runs]
+    values = [[shown(results, frame, field) for frame in row] for results, row in zip(runs, frames, strict=True)]
+    low, high = colour_limits(np.concatenate([one for row in values for one in row]), field.signed)
+    windows = [window(results.scenario, row) for results, row in zip(runs, frames, strict=True)]
+
+    # Panels as wide as a page, but no taller than a third of one; the rest of the width is labels and scale.
+    aspects = [(right - left) / (top - bottom) for left, right, bottom, top in windows]
+    page = 7.0 if len(runs) == 1 else 5.0
+    panel_height = max(min(max(page / aspect, 0.6), 3.2) for aspect in aspects)
+    width = sum(min(max(panel_height * aspect, 4.0), page) for aspect in aspects) + 2.0
+    figure = Figure(figsize=(width, (panel_height + 0.35) * len(wanted) + 0.8), layout="compressed")
+    axes = figure.subplots(len(wanted), len(runs), squeeze=False)
+    drawn: Any = None
+    for column, results in enumerate(runs):
+        for row, frame in enumerate(frames[column]):
+            panel = axes[row, column]
+            drawn = draw_points(panel, frame, values[column][row], field, (low, high))
+            draw_surroundings(panel, results.scenario, frame, windows[column])
+            greatest = float(values[column][row].max(initial=0.0))
+            heading = f"t = {frame.time:.2f} s   greatest {field.label.split(',')[0]} {greatest:.3g} {field.unit}"
+            if row == 0 and len(runs) > 1:
+                heading = f"{results.scenario.title}\n{heading}"
+            panel.set_title(heading, fontsize=9, loc="left")
+            panel.set_ylabel("y [m]" if column == 0 else "")
+        axes[-1, column].set_xlabel("x [m]")
+    if len(runs) == 1:
+        figure.suptitle(runs[0].scenario.title, fontsize=11)
+    figure.colorbar(
+        drawn, ax=list(axes.ravel()), label=field.title, extend="both" if field.signed else "max", shrink=0.9, pad=0.01
+    )
+    return figure
+
+
+def shown(results: Results, frame: Snapshot, field: Field) -> np.ndarray:
+    """Values [N] of a field of a snapshot.
+
+    Raises:
+        ResultsError: the run has no such field.
+    """
+    values = field_values(frame, field.name, results.scenario.flow.material.solid_partial_density)
+    if values is None:
+        raise ResultsError(f"{results.path} has no {field.label}: it is a {results.scenario.flow.formulation} flow.")
+    return values
+
+
+def window(scenario: Scenario, frames: Sequence[Snapshot]) -> Window:
+    """Limits [m] that hold the material and the barrier in all frames."""
+    points = np.concatenate([frame.position for frame in frames])
+    if scenario.barrier is not None and isinstance(scenario.barrier.shape, Trapezoid):
+        outlines = [_moved(scenario.barrier.shape, frame.barrier_displacement or 0.0) for frame in frames]
+        points = np.concatenate([points, *outlines])
+    (left, bottom), (right, high) = points.min(axis=0), points.max(axis=0)
+    margin = 0.03 * max(right - left, high - bottom)
+    if scenario.ground is not None:
+        bottom = 0.0
+    return float(left - margin), float(right + margin), float(bottom - margin), float(high + margin)
+
+
+def draw_points(
+    panel: Axes, frame: Snapshot, values: np.ndarray, field: Field, limits: tuple[float, float]
+) -> EllipseCollection:
+    """Each material point as a disc to scale, wide enough to meet its neighbours in a flow that has stretched."""
+    diameter = 1.4 * np.sqrt(frame["volume"])
+    discs = EllipseCollection(
+        diameter,
+        diameter,
+        np.zeros(len(diameter)),
+        units="xy",
+        offsets=frame.position,
+        offset_transform=panel.transData,
+        cmap="RdBu_r" if field.signed else "viridis",
+        linewidths=0.0,
+    )
+    discs.set_array(values)
+    discs.set_clim(*limits)
+    panel.add_collection(discs)
+    return discs
+
+
+def draw_surroundings(panel: Axes, scenario: Scenario, frame: Snapshot, limits: Window) -> None:
+    """Ground, barrier where it stands and, dotted, where it stood; and the panel's limits."""
+    left, right, bottom, high = limits
+    panel.set(xlim=(left, right), ylim=(bottom, high), aspect="equal")
+    if scenario.ground is not None:
+        panel.axhspan(bottom, 0.0, color=GROUND, linewidth=0.0)
+        panel.axhline(0.0, color=GREY, linewidth=0.8)
+    if scenario.barrier is None:
+        return
+    shift = frame.barrier_displacement or 0.0
+    if isinstance(scenario.barrier.shape, Trapezoid):
+        now, start = _moved(scenario.barrier.shape, shift), scenario.barrier.shape.polygon
+        panel.add_patch(PolygonPatch(now, facecolor=BARRIER, edgecolor=EDGE, linewidth=0.8))
+        if abs(shift) > 0.002 * (right - left):
+            panel.add_patch(PolygonPatch(start, fill=False, edgecolor=GREY, linewidth=0.8, linestyle=":"))
+    else:
+        panel.add_patch(Rectangle((shift, 0.0), right - shift, high, facecolor=BARRIER, edgecolor=EDGE))
+
+
+def _moved(shape: Trapezoid, displacement: float) -> np.ndarray:
+    return shape.polygon + np.array([displacement, 0.0])
