@@ -90,15 +90,15 @@ class Worker:
             "barrier_displacement": values.get("barrier_displacement", 0.0),
             "pore_pressure_max": values.get("pore_pressure_max", 0.0),
             "flow_kinetic_energy": values["flow_kinetic_energy"],
-            "overtopped_volume": self._overtopped_volume(),
         }
 
-    def _overtopped_volume(self) -> float:
+    def overtopped_volume(self) -> dict[str, Any]:
         from warp_mpm.mechanism import deposit
 
-        if self.scenario.barrier is None:
-            return 0.0
-        return deposit(self.scenario, _Present(self.simulation))["overtopped_volume"] or 0.0  # type: ignore[arg-type]
+        volume = 0.0
+        if self.scenario.barrier is not None:
+            volume = deposit(self.scenario, _Present(self.simulation))["overtopped_volume"] or 0.0  # type: ignore[arg-type]
+        return {"overtopped_volume": volume}
 
     def save_state(self) -> dict[str, Any]:
         self.last_key += 1

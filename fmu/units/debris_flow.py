@@ -7,6 +7,7 @@ import json
 import os
 import time
 import weakref
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,9 @@ INTERFACE = Interface(
     step_size=0.01,
 )
 
-_FROM_WORKER = tuple(v.name for v in INTERFACE.of("output") if v.name not in ("time_ratio", "message"))
+_NOT_SAMPLED = ("overtopped_volume", "time_ratio", "message")
+_SAMPLED = tuple(v.name for v in INTERFACE.of("output") if v.name not in _NOT_SAMPLED)
+_OVERTOPPED = INTERFACE.references["overtopped_volume"]
 
 
 class WorkerState:
@@ -150,6 +153,7 @@ class DebrisFlowSlave(UnitSlave):
         self.states: weakref.WeakSet[WorkerState] = weakref.WeakSet()
         self.start_time = 0.0
         self.wall_time = 0.0
+        self.overtopped_due = False
 
     def start(self) -> None:
         self.start_time, self.wall_time = self.time, 0.0
@@ -195,11 +199,27 @@ class DebrisFlowSlave(UnitSlave):
         self._take(answer)
 
     def _take(self, answer: dict[str, Any]) -> None:
-        for name in _FROM_WORKER:
+        for name in _SAMPLED:
             self[name] = answer[name]
         if self.wall_time == 0.0:
             self["time_ratio"] = 0.0
         self["message"] = ""
+        self.overtopped_due = True
+
+    def _get(self, kind: str, references: Sequence[int]) -> list[Any]:
+        # It takes all material points, which the other outputs do not: counted only for an importer that asks.
+        if self.overtopped_due and self.worker is not None and kind == "Real" and _OVERTOPPED in references:
+            self.overtopped_due = False
+            try:
+                answer = self.worker.ask("overtopped_volume", self["reply_time_limit"])
+                self["overtopped_volume"] = answer["overtopped_volume"]
+            except UnitError as error:
+                self.fail(str(error))
+        return super()._get(kind, references)
+
+    def fail(self, message: str) -> None:
+        super().fail(message)
+        self.overtopped_due = False
 
     def close(self) -> None:
         worker, self.worker = getattr(self, "worker", None), None
@@ -223,6 +243,7 @@ class DebrisFlowSlave(UnitSlave):
         state, limit = snapshot["worker_state"], self["reply_time_limit"]
         self.start_time, self.wall_time = snapshot["start_time"], snapshot["wall_time"]
         worker = self._open()
+        self.overtopped_due = True
         if isinstance(state, WorkerState) and state.worker is worker:
             worker.ask("restore_state", limit, key=state.key)
         else:

@@ -1,0 +1,156 @@
+"""The co-simulation of the documentation: it must agree with the simulation that moves its barrier itself."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from warp_mpm import Scenario, Simulation
+
+ROOT = Path(__file__).parents[2]
+SPACING = 0.75
+ANCHOR = {"stiffness": 1e5, "yield_force": 150e3}
+
+
+def documented(name: str) -> ModuleType:
+    """A script of the documentation as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / "cosimulation" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+coupled = documented("coupled")
+system = documented("system")
+
+
+@pytest.fixture(scope="module")
+def folder(archives: dict[str, Path]) -> Path:
+    return archives["DebrisFlow"].parent
+
+
+def monolithic(end: float, anchor: dict[str, float] | None = None) -> float:
+    """Final displacement [m] of the simulation that moves its barrier itself.
+
+    It stops at the communication points too, since that shortens its time steps; an anchor's force is renewed there.
+    """
+    scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced({"numerics.spacing_m": SPACING})
+    simulation = Simulation(scenario)
+    for step in range(1, round(end / 0.01) + 1):
+        if anchor:
+            pull = min(anchor["stiffness"] * simulation.barrier_displacement, anchor["yield_force"])
+            simulation.set_external_force(-pull)
+        simulation.advance(until=step * 0.01)
+    return simulation.barrier_displacement
+
+
+@pytest.mark.parametrize("scheme", ["gauss-seidel", "jacobi"])
+def test_final_displacement_is_that_of_the_monolithic_run(scheme: str, folder: Path) -> None:
+    """Within 2 % at a communication step of 10 ms; 0.2 % was measured."""
+    rows = coupled.run_coupled(folder, step=0.01, end=6.0, spacing=SPACING, scheme=scheme)
+    assert rows[-1].barrier_velocity == 0.0
+    assert rows[-1].barrier_displacement == pytest.approx(monolithic(6.0), rel=0.02)
+
+
+def test_anchor_holds_as_much_as_in_the_monolithic_run(folder: Path) -> None:
+    rows = coupled.run_coupled(folder, step=0.01, end=2.0, spacing=SPACING, anchor=ANCHOR)
+    assert rows[-1].anchor_force == -ANCHOR["yield_force"]
+    assert rows[-1].barrier_displacement == pytest.approx(monolithic(2.0, ANCHOR), rel=0.01)
+    assert rows[-1].barrier_displacement < 0.95 * monolithic(2.0)
+
+
+def test_coupling_error_falls_with_the_step(folder: Path) -> None:
+    """First order in the step, for a barrier so light that the coupling is what rules."""
+    scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(
+        {
+            "numerics.spacing_m": SPACING,
+            "barrier.motion": {"kind": "sliding", "mass_kg_per_m": 10000.0, "base_friction": 0.29},
+        }
+    )
+    simulation = Simulation(scenario)
+    simulation.advance(until=1.0)
+    errors = []
+    for step in (0.05, 0.01):
+        rows = coupled.run_coupled(folder, step=step, end=1.0, spacing=SPACING, barrier_mass=10000.0)
+        errors.append(abs(rows[-1].barrier_displacement / simulation.barrier_displacement - 1))
+    assert errors[1] < 0.02
+    assert errors[1] < errors[0] / 2.5  # first order: 5; chaos of the free surface takes its share
+
+
+def test_ssp_archive_runs_with_every_master(folder: Path, tmp_path: Path) -> None:
+    """fmpy's runner, libcosim and ecos against the master script with the same scheme and step."""
+    path = system.write_system(folder, tmp_path / "system.ssp", spacing=SPACING)
+    expected = coupled.run_coupled(folder, step=0.02, end=1.0, spacing=SPACING, scheme="jacobi", anchor=ANCHOR)
+    from fmpy.ssp.simulation import simulate_ssp
+
+    # fmpy adds up its steps and would take one more than fits but for rounding: it stops half a step early.
+    result = simulate_ssp(str(path), stop_time=0.99, step_size=0.02, parameter_set=system.parameters(path))
+    displacement = expected[-1].barrier_displacement
+    assert result["barrier.barrier_displacement"][-1] == pytest.approx(displacement, rel=1e-6)
+    for master in (LIBCOSIM, ECOS):
+        done = subprocess.run(
+            [sys.executable, "-c", textwrap.dedent(master), str(path)],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        # They pass the initial outputs on before the first step, which fmpy's runner and the script do not differ from.
+        assert float(done.stdout) == pytest.approx(displacement, rel=1e-3), master
+
+
+LIBCOSIM = """
+    import sys
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_ssp_file(sys.argv[1], 20_000_000)
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    index = execution.slave_index_from_instance_name("barrier")
+    references = {v.name.decode(): v.reference for v in execution.slave_variables(index)}
+    assert execution.simulate_until(1_000_000_000)
+    print(observer.last_real_values(index, [references["barrier_displacement"]])[0])
+"""
+
+ECOS = """
+    import ctypes, sys
+    from pathlib import Path
+    ctypes.CDLL(str(next(Path(sys.prefix, "lib").glob("libtbb.so.*"))), ctypes.RTLD_GLOBAL)
+    from ecospy import EcosLib, EcosSimulation
+    EcosLib.set_log_level("err")
+    simulation = EcosSimulation(0.02, ssp_path=sys.argv[1])
+    simulation.init(0.0, "scene")
+    simulation.step(50)
+    print(simulation.get_real("barrier::barrier_displacement"))
+    simulation.terminate()
+    simulation.free()
+"""
+
+
+def test_ten_line_script_runs(folder: Path) -> None:
+    """The first example of the documentation, as it stands there."""
+    text = (ROOT / "docs" / "cosimulation.md").read_text(encoding="utf-8")
+    script = text.split("```python\n")[1].split("```")[0]
+    assert len(script.strip().splitlines()) <= 10
+    done = subprocess.run(
+        [sys.executable, "-c", script.replace("build/fmu", str(folder)).replace("plt.show()", "")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={"MPLBACKEND": "Agg", "PATH": "/usr/bin:/bin"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert "1.36" in done.stdout
