@@ -122,7 +122,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                     corner = grid.corner[ci - 1 + k, cj - 1 + m]
                     smooth += (hx[k] * hy[m]) * corner
                     if RELAXATION:
-                        least_filling = wp.min(least_filling, corner[0])
+                        least_filling = wp.where(corner[0] < least_filling, corner[0], least_filling)
             filling = smooth[0]
             if SMOOTHING:
                 divergence = smooth[1]
