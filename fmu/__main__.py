@@ -203,7 +203,15 @@ def _print_comparison(found: CrossCheck) -> None:
             cells.append("–" if rms is None else f"{rms:.1%}")
         rows.append([f"unit, {comparison.name}", *cells])
     fits = [c.parameters for c in found.comparisons if c.name == "calibrated"]
-    notes = [f"Calibrated: s1max = {p['s1max']:.4g} m, τ = {p['rise_ratio']:.3g}." for p in fits]
+    notes = [
+        f"Calibrated: s1max = {p['s1max']:.4g} m (λ = {p['s1max'] / p['flow_length']:.3g}), τ = {p['rise_ratio']:.3g}."
+        for p in fits
+    ]
+    notes += [
+        f"With vertical load: κ = {c.parameters['vertical_load_ratio']:.3g}."
+        for c in found.comparisons
+        if "vertical_load_ratio" in c.parameters
+    ]
     notes += [
         f"Simulated force: {found.filter_rule}. rms: over the largest simulated value.",
         *found.scene.remarks,

@@ -1,12 +1,15 @@
 """The closed-form unit against the simulation of the same scenario: one figure, one table of differences.
 
-Three ways of giving the unit its force are compared with the simulation:
+Four ways of giving the unit its force are compared with the simulation:
 
 ``paper``
     lambda as the paper prints it for fixed and sliding barriers; tau, which the paper does not print, as assumed in
     ``analytic.scene``.
 ``calibrated``
     s1max and tau from the simulated force, by the paper's rule: its peak and the time of its peak.
+``with vertical load``
+    As calibrated, and the base friction raised by the flow's weight on the barrier: kappa is the ratio of the simulated
+    vertical to the horizontal impulse. The paper's model leaves it out.
 ``simulated force``
     The simulated force and vertical load as inputs of the unit. What is left is the barrier's own motion, so this tells
     a fault in the unit from a limit of the closed form.
@@ -25,7 +28,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.calibration import calibrate, cumulative_impulse, measure, moving_mean
+from analytic.calibration import (
+    calibrate,
+    cumulative_impulse,
+    measure,
+    measured_vertical_load_ratio,
+    moving_mean,
+)
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
 
 if TYPE_CHECKING:
@@ -100,7 +109,7 @@ class CrossCheck:
 def cross_check(
     scenario: Scenario, unit: Path, *, device: str = "cpu", on_progress: Callable[[float], None] | None = None
 ) -> CrossCheck:
-    """Simulate a scenario, calibrate the closed form on it, and run the unit through fmpy in its three ways.
+    """Simulate a scenario, calibrate the closed form on it, and run the unit through fmpy in its four ways.
 
     Parameters
     ----------
@@ -118,11 +127,18 @@ def cross_check(
     simulated = simulate(scenario, device=device, on_progress=on_progress)
     fit = calibrate(simulated.time, simulated.force, scene)
     common = {"arrival_time": fit.measured.arrival_time, **scene_parameters(scene)}
+    calibrated = {"s1max": fit.impact.geometry_change_length, "rise_ratio": fit.impact.rise_ratio}
     ways: dict[str, dict[str, Any]] = {
         "paper": {"geometry_change": scene.paper_geometry_change, "rise_ratio": ASSUMED_RISE_RATIO},
-        "calibrated": {"s1max": fit.impact.geometry_change_length, "rise_ratio": fit.impact.rise_ratio},
-        "simulated force": {"impact_force_source": 2},
+        "calibrated": calibrated,
     }
+    if not scene.fixed:
+        assert simulated.vertical_load is not None
+        kappa = measured_vertical_load_ratio(
+            simulated.time, simulated.force, simulated.vertical_load, weight=0.0, measured=fit.measured
+        )
+        ways["with vertical load"] = calibrated | {"vertical_load_ratio": max(kappa, 0.0)}
+    ways["simulated force"] = {"impact_force_source": 2}
     figures = key_figures(simulated)
     comparisons = []
     for name, own in ways.items():

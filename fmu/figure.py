@@ -6,12 +6,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analytic.calibration import FILTER_WINDOW, moving_mean
-from analytic.plots import BLUE, GREY, ORANGE, SKY
+from analytic.plots import BLUE, GREEN, GREY, ORANGE, SKY
 from fmu.cross_check import Array, CrossCheck, Trajectory
 
 _STYLES = {
     "paper": (ORANGE, "--", "unit, the paper's λ"),
     "calibrated": (BLUE, "-", "unit, calibrated"),
+    "with vertical load": (GREEN, "-.", "unit, calibrated, with the flow's weight"),
     "simulated force": (SKY, ":", "unit, driven by the simulated force"),
 }
 
@@ -31,8 +32,8 @@ def cross_check_figure(check: CrossCheck) -> Figure:
         )
         for comparison in check.comparisons:
             color, line, text = _STYLES[comparison.name]
-            if name == "force" and comparison.name == "simulated force":
-                continue  # it is the simulation's own
+            if name == "force" and comparison.name in ("simulated force", "with vertical load"):
+                continue  # the simulation's own, and the calibrated one
             values = getattr(comparison.trajectory, name)
             axis.plot(comparison.trajectory.time, factor * values, color=color, linestyle=line, label=text)
         axis.set_ylabel(label)
