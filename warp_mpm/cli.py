@@ -34,8 +34,8 @@ def main() -> None:
 )
 def run(
     scenario_file: Annotated[
-        Path, typer.Argument(metavar="SCENARIO", help="Scenario file (JSON).", show_default=False)
-    ],
+        Path | None, typer.Argument(metavar="SCENARIO", help="Scenario file (JSON).", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results.", show_default="runs/NAME of the scenario")
     ] = None,
@@ -48,6 +48,10 @@ def run(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Go on with the interrupted run in this folder.", show_default=False),
+    ] = None,
 ) -> None:
     """Simulate a scenario and write its results into a folder.
 
@@ -55,18 +59,29 @@ def run(
     intervals (snapshots.vtkhdf, for ParaView and h5py), two figures (PNG), the resolved scenario (scenario.json) and
     the record of the run (run.json).
 
-    Ctrl-C ends the run cleanly and keeps all that was computed. Exit codes: 0 done, 2 the input cannot be used, 3 the
-    simulation diverged, 130 interrupted.
+    Ctrl-C ends the run cleanly and keeps all that was computed. A run that was interrupted, by whatever, goes on with
+    --resume DIR, and on the CPU gives the same numbers as one that was not.
+
+    Exit codes: 0 done, 2 the input cannot be used, 3 the simulation diverged, 130 interrupted.
     """
-    scenario = _scenario(scenario_file, spacing, until)
-    folder = out if out is not None else Path("runs") / scenario_file.stem
+    if resume is not None:
+        if scenario_file is not None or out is not None or spacing is not None or until is not None or force:
+            _refuse("--resume DIR goes on with a run as it was begun; beside it only --device and --quiet are allowed.")
+        folder, scenario = resume, _scenario_of(resume)
+    elif scenario_file is None:
+        _refuse("run needs a scenario file, or --resume DIR to go on with an interrupted run.")
+    else:
+        scenario = _scenario(scenario_file, spacing, until)
+        folder = out if out is not None else Path("runs") / scenario_file.stem
 
     from warp_mpm.recording.run_folder import RunFolder, RunFolderError
-    from warp_mpm.run import run_scenario
+    from warp_mpm.results import ResultsError
+    from warp_mpm.run import resume_run, run_scenario
     from warp_mpm.terminal import RunDisplay, StopOnSignal
 
     try:
-        RunFolder.check(folder, force=force)
+        if resume is None:
+            RunFolder.check(folder, force=force)
     except RunFolderError as error:
         _refuse(str(error))
     from warp_mpm.simulation import Simulation, SimulationDiverged
@@ -79,29 +94,38 @@ def run(
 
     try:
         with StopOnSignal() as signal, RunDisplay(scenario, device=device, quiet=quiet) as display:
-            outcome = run_scenario(
-                scenario,
-                folder,
-                make_simulation=make_simulation,
-                force=force,
-                origin=str(scenario_file),
-                on_progress=display.show,
-                stop=lambda: signal.received,
-            )
-    except RunFolderError as error:
+            stopped = lambda: signal.received  # noqa: E731
+            if resume is not None:
+                outcome = resume_run(folder, make_simulation=make_simulation, on_progress=display.show, stop=stopped)
+            else:
+                outcome = run_scenario(
+                    scenario,
+                    folder,
+                    make_simulation=make_simulation,
+                    force=force,
+                    origin=str(scenario_file),
+                    on_progress=display.show,
+                    stop=stopped,
+                )
+    except (RunFolderError, ResultsError) as error:
         _refuse(str(error))
     except SimulationDiverged as error:
-        _complain(f"{error} What was computed before is in {folder}.")
+        _complain(
+            f"{error} What was computed before is in {folder}, with a state from shortly before the failure; to see it "
+            f"fail again: python -m warp_mpm run --resume {folder}"
+        )
         raise typer.Exit(DIVERGED) from None
     except OSError as error:
-        _complain(f"Cannot write to {folder}: {error.strerror or error}. What was written before is kept.")
+        _complain(
+            f"Cannot write to {folder}: {error.strerror or error}. What was written before is kept; to go on once that "
+            f"is mended: python -m warp_mpm run --resume {folder}"
+        )
         raise typer.Exit(BAD_INPUT) from None
     display.summarize(outcome)
     if not outcome.finished:
-        again = " ".join(["python -m warp_mpm", *(arg for arg in sys.argv[1:] if arg != "--force"), "--force"])
         _complain(
             f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "
-            f"To run it to the end: {again}"
+            f"To run it to the end: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(INTERRUPTED)
 
@@ -142,6 +166,17 @@ def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenari
     try:
         return Scenario.load(file).replaced({path: value for path, value in changes.items() if value is not None})
     except ScenarioError as error:
+        _refuse(str(error))
+
+
+def _scenario_of(folder: Path) -> Scenario:
+    """The scenario of the run in a folder."""
+    from warp_mpm.results import Results, ResultsError
+    from warp_mpm.scenario_errors import ScenarioError
+
+    try:
+        return Results.open(folder).scenario
+    except (ResultsError, ScenarioError) as error:
         _refuse(str(error))
 
 

@@ -15,7 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from warp_mpm import plotting
-from warp_mpm.recording import Recorder, RunFolder, SnapshotRecorder, TimeSeriesRecorder, record_until, run_folder
+from warp_mpm.recording import (
+    Checkpointer,
+    Recorder,
+    RunFolder,
+    SnapshotRecorder,
+    TimeSeriesRecorder,
+    read_checkpoint,
+    record_until,
+    run_folder,
+)
+from warp_mpm.recording.checkpoint import Checkpoint, versions
+from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Scenario
 from warp_mpm.summary import summarize
@@ -85,16 +96,93 @@ def run_scenario(
     RunFolder.check(out, force=force)
     preparing = time.perf_counter()
     simulation = make_simulation(scenario)
-    started = time.perf_counter()
-    end_time, output = scenario.output.end_time_s, scenario.output
-    record = _record(scenario, simulation, origin)
-    folder = RunFolder.create(out, scenario.resolved(), record, force=force)
+    record = _record(scenario, simulation, origin) | {"preparation_time": time.perf_counter() - preparing}
+    with RunFolder.create(out, scenario.resolved(), record, force=force) as folder:
+        return _go_on(folder, scenario, simulation, record, on_progress, stop)
 
-    series = TimeSeriesRecorder(out / run_folder.TIME_SERIES, output.time_series_interval_s)
-    recorders: list[Recorder] = [
-        series,
-        SnapshotRecorder(out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time),
-    ]
+
+def resume_run(
+    out: Path,
+    *,
+    make_simulation: Callable[[Scenario], Any],
+    on_progress: Callable[[RunProgress], None] | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> RunOutcome:
+    """Go on with an interrupted run from its last checkpoint; on the CPU its records are then, bit for bit, those of a
+    run that was not interrupted. A run that was interrupted before its first record begins anew.
+
+    Args:
+        out: the run folder.
+        make_simulation, on_progress, stop: as in `run_scenario`.
+
+    Raises:
+        RunFolderError: there is nothing to go on with, or it is damaged; the sentence says so, nothing was touched.
+        ScenarioError, ResultsError: the scenario or the record in the folder cannot be read.
+    """
+    results = Results.open(out)
+    with RunFolder(out) as folder:
+        folder.lock()
+        record = results.record
+        if record.get("status") == "finished":
+            outcome = RunOutcome(out, True, evaluate(out))
+            (out / run_folder.CHECKPOINT).unlink(missing_ok=True)
+            return outcome
+        if not (out / run_folder.SCENARIO).exists():
+            raise RunFolderError(f"{out} holds a run that ended before it began; start it again with --force.")
+        scenario = results.scenario
+        checkpoint = None
+        if (out / run_folder.CHECKPOINT).exists():
+            checkpoint = read_checkpoint(out / run_folder.CHECKPOINT, scenario.resolved())
+        simulation = make_simulation(scenario)
+        if checkpoint is None:
+            for name in (run_folder.TIME_SERIES, run_folder.SNAPSHOTS):
+                (out / name).unlink(missing_ok=True)
+        else:
+            try:
+                simulation.restore_state(checkpoint.state)
+            except ValueError as error:
+                raise RunFolderError(f"{out / run_folder.CHECKPOINT} cannot be used: {error}.") from None
+        start = checkpoint.time if checkpoint is not None else 0.0
+        resumed = {"at": _now(), "simulated_time": start, "device": str(simulation.device)}
+        record |= {"status": "running", "problem": None, "resumed": [*record.get("resumed", []), resumed]}
+        return _go_on(folder, scenario, simulation, record, on_progress, stop, checkpoint)
+
+
+def _go_on(
+    folder: RunFolder,
+    scenario: Scenario,
+    simulation: Any,
+    record: dict[str, Any],
+    on_progress: Callable[[RunProgress], None] | None,
+    stop: Callable[[], bool],
+    checkpoint: Checkpoint | None = None,
+) -> RunOutcome:
+    """Run to the end and record, from the start or from a checkpoint to which the simulation has been set back."""
+    out, output, end_time = folder.path, scenario.output, scenario.output.end_time_s
+    wall_before = checkpoint.wall_time if checkpoint is not None else 0.0
+    marks: dict[str, Any] = checkpoint.marks if checkpoint is not None else {}
+    started = time.perf_counter()
+    # The structure of the snapshots can be damaged in more ways than a text: it is opened before that is cut.
+    snapshots = SnapshotRecorder(
+        out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time, mark=marks.get("snapshots")
+    )
+    try:
+        series = TimeSeriesRecorder(
+            out / run_folder.TIME_SERIES, output.time_series_interval_s, mark=marks.get("time_series")
+        )
+    except RunFolderError:
+        snapshots.close()
+        raise
+    recorders: list[Recorder] = [series, snapshots]
+    if checkpoint is not None:
+        folder.write(run_folder.RECORD, record)
+    checkpointer = Checkpointer(
+        folder,
+        scenario.resolved(),
+        {"time_series": series, "snapshots": snapshots},
+        output.checkpoint_interval_s,
+        wall_before=wall_before,
+    )
 
     first: list[float] = []
 
@@ -107,7 +195,9 @@ def run_scenario(
 
     status, problem = "failed", None
     try:
-        finished = record_until(simulation, recorders, end_time, on_step=report, stop=stop)
+        finished = record_until(
+            simulation, recorders, end_time, on_step=report, stop=stop, after_records=checkpointer.after_records
+        )
         status = "finished" if finished else "stopped"
     except Exception as error:
         problem = str(error)
@@ -122,13 +212,15 @@ def run_scenario(
             "problem": problem,
             "ended": _now(),
             "simulated_time": simulation.time,
-            "preparation_time": started - preparing,
-            "wall_time": time.perf_counter() - started,
+            "wall_time": wall_before + time.perf_counter() - started,
             **simulation.record,
         }
         with contextlib.suppress(OSError):
             folder.write(run_folder.RECORD, record | ended)
-    return RunOutcome(out, finished, evaluate(out))
+    outcome = RunOutcome(out, finished, evaluate(out))
+    if finished:
+        (out / run_folder.CHECKPOINT).unlink(missing_ok=True)
+    return outcome
 
 
 def evaluate(path: Path) -> dict[str, Any]:
@@ -158,10 +250,10 @@ def _ruling_limit(record: dict[str, Any]) -> str | None:
 
 
 def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
-    versions = {"python": platform.python_version()}
-    for package in ("warp-mpm-impact", "warp-lang", "numpy", "h5py"):
+    used = {"python": platform.python_version(), **versions()}
+    for package in ("numpy", "h5py"):
         with contextlib.suppress(metadata.PackageNotFoundError):
-            versions[package] = metadata.version(package)
+            used[package] = metadata.version(package)
     return {
         "format": FORMAT,
         "status": "running",
@@ -172,7 +264,7 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         "device": str(simulation.device),
         "material_points": simulation.material_points,
         "machine": f"{platform.system()} {platform.machine()}",
-        "versions": versions,
+        "versions": used,
         **_commit(),
     }
 

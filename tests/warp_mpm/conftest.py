@@ -1,5 +1,6 @@
 """A stand-in for the simulation: material points that fly freely, and a force known in closed form."""
 
+import json
 import math
 from pathlib import Path
 
@@ -34,6 +35,12 @@ class FlyingPoints:
             raise ArithmeticError("the run has diverged")
         self.steps += 1
         self.time = until
+
+    def save_state(self):
+        return json.dumps([self.time, self.steps, self._sampled]).encode()
+
+    def restore_state(self, data):
+        self.time, self.steps, self._sampled = json.loads(data)
 
     @property
     def record(self):

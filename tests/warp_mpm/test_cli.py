@@ -123,7 +123,10 @@ def test_divergence_keeps_what_was_computed(command, monkeypatch, flying_points)
     monkeypatch.setattr(warp_mpm.simulation, "Simulation", Diverging)
     result = run(command, "--out", "here")
     assert result.exit_code == DIVERGED
-    assert "The run diverged at t = 0.5 s. What was computed before is in here." in result.stderr
+    assert "The run diverged at t = 0.5 s. What was computed before is in here, with a state" in result.stderr
+    assert (Path("here") / run_folder.CHECKPOINT).is_file()
+    again = command("run", "--resume", "here")
+    assert again.exit_code == DIVERGED
     assert Results.open("here").time_series["time"][-1] == pytest.approx(0.5)
     assert Results.open("here").record["status"] == "failed"
 
@@ -140,13 +143,49 @@ def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flyi
     result = run(command, "--out", "here")
     assert result.exit_code == INTERRUPTED
     assert "Stopped at t = 0.500 s; everything up to there is in here. To run it to the end:" in result.stderr
-    assert "--force" in result.stderr
+    assert "run --resume here" in result.stderr
     results = Results.open("here")
     assert results.record["status"] == "stopped"
     assert results.summary["end_time"] == pytest.approx(0.5)
     assert results.snapshots.times[-1] == pytest.approx(0.5)
     assert (Path("here") / run_folder.PRESSURE_PLOT).is_file()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler  # the shell has its Ctrl-C back
+
+
+def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
+    class Interrupted(flying_points):
+        def advance(self, until):
+            super().advance(until)
+            if until == pytest.approx(0.52):  # between two snapshots
+                os.kill(os.getpid(), signal.SIGINT)
+
+    assert run(command, "--out", "whole").exit_code == 0
+    with monkeypatch.context() as context:
+        context.setattr(warp_mpm.simulation, "Simulation", Interrupted)
+        assert run(command, "--out", "here").exit_code == INTERRUPTED
+    assert command("run", "--resume", "here").exit_code == 0
+    for name in (run_folder.TIME_SERIES, run_folder.SCENARIO):
+        assert (Path("here") / name).read_bytes() == (Path("whole") / name).read_bytes()
+    assert list(Results.open("here").snapshots.times) == list(Results.open("whole").snapshots.times)
+    record = Results.open("here").record
+    assert record["status"] == "finished"
+    assert record["resumed"][0]["simulated_time"] == pytest.approx(0.52)
+    assert {item.name for item in Path("here").iterdir()} == set(run_folder.OWN_FILES)
+    assert command("run", "--resume", "here").exit_code == 0  # nothing left to do
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--resume", "none"), "none is no folder."),
+        (("--resume", "none", "--spacing", "1"), "--resume DIR goes on with a run as it was begun"),
+        ((), "run needs a scenario file, or --resume DIR"),
+    ],
+)
+def test_nothing_to_go_on_with(command, arguments, sentence):
+    result = command("run", *arguments)
+    assert result.exit_code == BAD_INPUT
+    assert sentence in result.stderr
 
 
 def test_check_tells_what_a_scene_is(command):

@@ -268,11 +268,14 @@ def test_truncated_snapshots(tmp_path):
 
 def test_a_run_folder_is_never_overwritten_unasked(tmp_path):
     path = tmp_path / "deep" / "run"
-    RunFolder.create(path, {"title": "a"}, {"status": "running"})
+    first = RunFolder.create(path, {"title": "a"}, {"status": "running"})
     (path / "mine.txt").write_text("notes")
     (path / run_folder.TIME_SERIES).write_text("old")
     with pytest.raises(RunFolderError, match=r"holds a run already; .* --force"):
         RunFolder.create(path, {}, {})
+    with pytest.raises(RunFolderError, match="Another run is writing to"):
+        RunFolder.create(path, {}, {}, force=True)
+    first.release()
     RunFolder.create(path, {"title": "b"}, {"status": "running"}, force=True)
     assert '"b"' in (path / run_folder.SCENARIO).read_text()
     assert not (path / run_folder.TIME_SERIES).exists()

@@ -1,8 +1,18 @@
 """Recorders: what a run writes while it goes on. They read the simulation; the simulation knows nothing of them."""
 
+from warp_mpm.recording.checkpoint import Checkpointer, read_checkpoint
 from warp_mpm.recording.run_folder import RunFolder
 from warp_mpm.recording.schedule import Recorder, Schedule, record_until
 from warp_mpm.recording.snapshots import SnapshotRecorder
 from warp_mpm.recording.time_series import TimeSeriesRecorder
 
-__all__ = ["Recorder", "RunFolder", "Schedule", "SnapshotRecorder", "TimeSeriesRecorder", "record_until"]
+__all__ = [
+    "Checkpointer",
+    "Recorder",
+    "RunFolder",
+    "Schedule",
+    "SnapshotRecorder",
+    "TimeSeriesRecorder",
+    "read_checkpoint",
+    "record_until",
+]

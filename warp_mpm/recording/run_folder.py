@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
+
+try:
+    import fcntl
+except ImportError:  # no such lock on Windows
+    fcntl = None  # type: ignore[assignment]
 
 SCENARIO = "scenario.json"
 RECORD = "run.json"
@@ -15,9 +22,14 @@ SNAPSHOTS = "snapshots.vtkhdf"
 SUMMARY = "summary.json"
 FORCE_PLOT = "force_and_displacement.png"
 PRESSURE_PLOT = "pore_pressure.png"
+CHECKPOINT = "checkpoint.bin"
+"""There only until the run has ended."""
 
 OWN_FILES = (SCENARIO, RECORD, TIME_SERIES, SNAPSHOTS, SUMMARY, FORCE_PLOT, PRESSURE_PLOT)
-"""All that a run writes, and all that `force` may remove."""
+"""All that a finished run leaves."""
+
+ASIDE = ".new"
+"""Ending of a file that is still being written."""
 
 
 class RunFolderError(OSError):
@@ -25,10 +37,44 @@ class RunFolderError(OSError):
 
 
 class RunFolder:
-    """A folder that a run may write to."""
+    """A folder that a run may write to. A context manager, which sets the folder free for other runs at its end."""
 
     def __init__(self, path: Path):
         self.path = path
+        self._lock: int | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+    def lock(self) -> None:
+        """Keep other runs out until `release`, or until the process ends, however it ends.
+
+        Raises:
+            RunFolderError: another run is writing there.
+        """
+        if fcntl is None or self._lock is not None:
+            return
+        descriptor = os.open(self.path, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            raise RunFolderError(f"Another run is writing to {self.path}; choose another folder with --out.") from None
+        except OSError:  # a file system without locks
+            os.close(descriptor)
+            return
+        self._lock = descriptor
+
+    def release(self) -> None:
+        """Let other runs in."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     @staticmethod
     def check(path: Path, *, force: bool = False) -> None:
@@ -47,11 +93,17 @@ class RunFolder:
         if RECORD not in names:
             raise RunFolderError(f"{path} holds files that no run has written; choose another folder with --out.")
         if not force:
-            raise RunFolderError(f"{path} holds a run already; choose another folder with --out, or add --force.")
+            unfinished = f", or go on with it: run --resume {path}" if (path / CHECKPOINT).exists() else ""
+            raise RunFolderError(
+                f"{path} holds a run already; choose another folder with --out, or add --force{unfinished}."
+            )
+        with RunFolder(path) as folder:
+            folder.lock()
 
     @classmethod
     def create(cls, path: Path, scenario: dict[str, Any], record: dict[str, Any], *, force: bool = False) -> RunFolder:
-        """Make the folder with the resolved scenario and the run's record; remove an older run's own files on `force`.
+        """Make the folder, locked, with the resolved scenario and the run's record; remove an older run's own files on
+        `force`.
 
         Raises:
             RunFolderError: see `check`, or the folder cannot be written to.
@@ -60,29 +112,49 @@ class RunFolder:
         folder = cls(path)
         try:
             path.mkdir(parents=True, exist_ok=True)
+            folder.lock()
             if force:
                 # The record goes last: as long as it is there, the folder is known as a run's.
-                for name in sorted(OWN_FILES, key=lambda name: name == RECORD):
+                own = (*(name for name in (*OWN_FILES, CHECKPOINT) if name != RECORD), RECORD)
+                for name in own:
+                    (path / (name + ASIDE)).unlink(missing_ok=True)
                     (path / name).unlink(missing_ok=True)
             # Of two runs that start at once into one folder, only one can create the record.
             with (path / RECORD).open("x", encoding="utf-8") as file:
                 file.write(_text(record))
             folder.write(SCENARIO, scenario)
         except FileExistsError:
+            folder.release()
             raise RunFolderError(f"Another run has just begun to write to {path}; choose another folder.") from None
+        except RunFolderError:
+            raise
         except OSError as error:
+            folder.release()
             raise RunFolderError(f"Cannot write to {path}: {error.strerror or error}.") from None
         return folder
 
     def write(self, name: str, content: dict[str, Any]) -> None:
         """Write a JSON file whole or not at all. A number that is none (NaN) or has no end is written as null."""
+        self.write_bytes(name, _text(content).encode())
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """Write a file whole or not at all.
+
+        Raises:
+            OSError: it could not be written; what was there before is there still.
+        """
         target = self.path / name
-        aside = target.with_name(name + ".new")
-        with aside.open("w", encoding="utf-8") as file:
-            file.write(_text(content))
-            file.flush()
-            os.fsync(file.fileno())
-        aside.replace(target)
+        aside = target.with_name(name + ASIDE)
+        try:
+            with aside.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            aside.replace(target)
+        except OSError:
+            with contextlib.suppress(OSError):
+                aside.unlink()
+            raise
 
 
 def finite(value: Any) -> Any:

@@ -30,18 +30,26 @@ class Schedule:
     def __init__(self, interval: float, start: float = 0.0):
         """Args: interval [s] between times; start: the first time is the first multiple at or after it [s]."""
         self.interval = interval
-        self._count = math.ceil(start / interval - 1e-6)
+        self.count = math.ceil(start / interval - 1e-6)
+        """Number of the time that comes next."""
 
     @property
     def next_time(self) -> float:
         """The time that comes next [s]."""
-        return self._count * self.interval
+        return self.count * self.interval
 
     def due(self, time: float) -> bool:
         """Whether the next time has come, up to rounding; if so, move on to the one after."""
         if self.next_time - time > 1e-6 * self.interval:
             return False
-        self._count += 1
+        self.count += 1
+        return True
+
+    def passed(self, time: float) -> bool:
+        """The same for one who is not asked at every time: those that were missed are passed over."""
+        if not self.due(time):
+            return False
+        self.count = math.floor(time / self.interval + 1e-6) + 1
         return True
 
 
@@ -64,6 +72,7 @@ def record_until(
     *,
     on_step: Callable[[Any], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    after_records: Callable[..., None] | None = None,
 ) -> bool:
     """Advance to `end_time` and let every recorder record at its times, at the start and at the end.
 
@@ -73,6 +82,8 @@ def record_until(
         end_time: [s].
         on_step: called after each stretch between records, for instance to show progress.
         stop: asked after each stretch; true ends the run early, with a last record.
+        after_records: called with the simulation and `stopping`, before the end, when the records that are due have
+            been made and before those that only a stop calls for: a run that goes on from there knows of no stop.
 
     Returns:
         True when `end_time` was reached, False when stopped before.
@@ -81,12 +92,22 @@ def record_until(
         if recorder.schedule.due(simulation.time):
             recorder.record(simulation)
     ended = simulation.time >= end_time
+    if after_records is not None and not ended:
+        after_records(simulation, stopping=False)
     while not ended:
         simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]))
-        ended = simulation.time >= end_time or stop()
+        late = []
         for recorder in recorders:
+            if recorder.schedule.due(simulation.time):
+                recorder.record(simulation)
+            else:
+                late.append(recorder)
+        ended = simulation.time >= end_time or stop()
+        if after_records is not None and simulation.time < end_time:
+            after_records(simulation, stopping=ended)
+        if ended:
             # The end is recorded even where it is no multiple of the interval.
-            if recorder.schedule.due(simulation.time) or ended:
+            for recorder in late:
                 recorder.record(simulation)
         if on_step is not None:
             on_step(simulation)

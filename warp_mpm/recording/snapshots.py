@@ -7,6 +7,9 @@ unit of a field is its data set's attribute `unit`: a slash in a name would be a
 
 from __future__ import annotations
 
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ import h5py
 import numpy as np
 
 from warp_mpm.recording.quantities import POINT_FIELDS, check_known
+from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 
 VTK_VERTEX = 1
@@ -26,11 +30,13 @@ class SnapshotRecorder:
     in. A process that is killed at any moment leaves a file that opens, with all snapshots before the last.
     """
 
-    def __init__(self, path: Path, interval: float, end_time: float):
-        """Create the file with room for the snapshots until `end_time` [s], every `interval` [s] and at the end.
+    def __init__(self, path: Path, interval: float, end_time: float, *, mark: Mapping[str, int] | None = None):
+        """Create the file with room for the snapshots until `end_time` [s], every `interval` [s] and at the end; or go
+        on at an earlier `mark` in it, dropping what was written after that.
 
         Raises:
             FileExistsError: there is one already.
+            RunFolderError: the file does not reach to the mark.
         """
         # Newer file versions mark a file that is open for writing, and a mark left by a killed process bars readers.
         self.schedule = Schedule(interval)
@@ -38,13 +44,75 @@ class SnapshotRecorder:
         self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
         self._count = 0
         self._points = 0
-        self._file: h5py.File | None = h5py.File(path, "x", libver=("earliest", "v108"), locking=False)
-        self._root = self._file.create_group("VTKHDF")
+        self._file: h5py.File | None = None
+        self._root: h5py.Group
         self._steps: h5py.Group
         self._fields: dict[str, h5py.Dataset] = {}
+        if mark is None:
+            self._file = h5py.File(path, "x", libver=("earliest", "v108"), locking=False)
+            self._root = self._file.create_group("VTKHDF")
+        else:
+            self._reopen(mark)
+
+    def _reopen(self, mark: Mapping[str, int]) -> None:
+        self.schedule.count = mark["records"]
+        self._count, self._points = mark["snapshots"], mark["points"]
+        try:
+            self._file = file = h5py.File(self._path, "r+", libver=("earliest", "v108"), locking=False)
+            self._root = root = file["VTKHDF"]
+            self._steps = steps = root["Steps"]
+            if min(len(steps["Values"]), int(steps.attrs["NSteps"])) < self._count:
+                raise ValueError("it does not reach to the checkpoint")
+            self._fields = dict(root["PointData"].items())
+            # A stop gave back the room that was not used.
+            number, room = len(root["Connectivity"]), self._room
+            for dataset in (root["Points"], root["Types"], *self._fields.values()):
+                dataset.resize(room * number, axis=0)
+            root["Offsets"].resize(room * (number + 1), axis=0)
+            for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
+                root[name].resize(room, axis=0)
+            root["FieldData/barrier_displacement"].resize(room, axis=0)
+            steps.visititems(lambda _, item: item.resize(room, axis=0) if isinstance(item, h5py.Dataset) else None)
+            self._set_constants()
+            steps["Values"].resize(self._count, axis=0)
+            steps.attrs.modify("NSteps", self._count)
+            file.flush()
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+            raise RunFolderError(f"{self._path} is damaged: {error}.") from None
+
+    def _set_constants(self) -> None:
+        """Numbers that are the same for every snapshot, over the whole room."""
+        steps = self._steps
+        steps["PartOffsets"][:] = np.arange(self._room)
+        steps["NumberOfParts"][:] = 1
+        steps["ConnectivityIdOffsets"][:] = 0
+        steps["FieldDataOffsets/barrier_displacement"][:] = np.arange(self._room)
+        steps["FieldDataSizes/barrier_displacement"][:] = 1  # one component, one tuple
+
+    def mark(self) -> dict[str, int]:
+        """Bring everything to the disk and tell where the file stands."""
+        assert self._file is not None
+        self._file.flush()
+        descriptor = os.open(self._path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        return {"records": self.schedule.count, "snapshots": self._count, "points": self._points}
 
     def record(self, simulation: Any) -> None:
-        """Append one snapshot."""
+        """Append one snapshot.
+
+        Raises:
+            OSError: it could not be written; those before are kept.
+        """
+        with _failures_of_the_disk():
+            self._append(simulation)
+
+    def _append(self, simulation: Any) -> None:
         points = dict(simulation.points())
         position = np.asarray(points.pop("position"))
         if self._count == 0:
@@ -80,6 +148,14 @@ class SnapshotRecorder:
         """Give back the room that was not used and close the file."""
         if self._file is None:
             return
+        with _failures_of_the_disk():
+            try:
+                self._give_back()
+            finally:
+                file, self._file = self._file, None
+                file.close()
+
+    def _give_back(self) -> None:
         if self._count > 0:
             for dataset in (self._root["Points"], self._root["Types"], *self._fields.values()):
                 dataset.resize(self._points, axis=0)
@@ -90,8 +166,6 @@ class SnapshotRecorder:
             self._steps.visititems(
                 lambda _, item: item.resize(self._count, axis=0) if isinstance(item, h5py.Dataset) else None
             )
-        self._file.close()
-        self._file = None
 
     def _lay_out(self, number: int, fields: dict[str, np.ndarray]) -> None:
         """Create every group, attribute and data set; `number` is the most points that any snapshot will have."""
@@ -113,12 +187,11 @@ class SnapshotRecorder:
         steps.attrs["NSteps"] = 0
         self._dataset(steps, "Values", 1, None, np.float64, chunk=room)
         steps["Values"].attrs["unit"] = "s"
-        part_offsets = self._dataset(steps, "PartOffsets", room, None, np.int64)
-        part_offsets[:] = np.arange(room)
-        self._dataset(steps, "NumberOfParts", room, None, np.int64)[:] = 1
+        self._dataset(steps, "PartOffsets", room, None, np.int64)
+        self._dataset(steps, "NumberOfParts", room, None, np.int64)
         self._dataset(steps, "PointOffsets", room, None, np.int64)
         self._dataset(steps, "CellOffsets", room, 1, np.int64)
-        self._dataset(steps, "ConnectivityIdOffsets", room, 1, np.int64)[:] = 0
+        self._dataset(steps, "ConnectivityIdOffsets", room, 1, np.int64)
 
         point_data, point_offsets = root.create_group("PointData"), steps.create_group("PointDataOffsets")
         for name, values in fields.items():
@@ -132,9 +205,10 @@ class SnapshotRecorder:
 
         field_data, field_offsets = root.create_group("FieldData"), steps.create_group("FieldDataOffsets")
         self._dataset(field_data, "barrier_displacement", room, None, np.float64)
-        self._dataset(field_offsets, "barrier_displacement", room, None, np.int64)[:] = np.arange(room)
+        self._dataset(field_offsets, "barrier_displacement", room, None, np.int64)
         sizes = steps.create_group("FieldDataSizes")
-        self._dataset(sizes, "barrier_displacement", room, 2, np.int64)[:] = 1  # one component, one tuple
+        self._dataset(sizes, "barrier_displacement", room, 2, np.int64)
+        self._set_constants()
         assert self._file is not None
         self._file.flush()
 
@@ -159,6 +233,17 @@ class SnapshotRecorder:
             group.id, name.encode(), h5py.h5t.py_create(np.dtype(kind), logical=True), space, dcpl=creation
         )
         return h5py.Dataset(identifier)
+
+
+@contextlib.contextmanager
+def _failures_of_the_disk() -> Iterator[None]:
+    """HDF5 reports them as errors of any kind, with its whole life in the message."""
+    try:
+        yield
+    except (OSError, RuntimeError, ValueError) as error:
+        text = str(error)
+        reason = text.partition("error message = '")[2].partition("'")[0]
+        raise OSError(reason or text.partition("\n")[0]) from None
 
 
 def _as_vtk(values: np.ndarray) -> np.ndarray:
