@@ -134,6 +134,15 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
         return -mass * result
 
     @wp.func
+    def leaves(velocity: V, normal: V2, surface_velocity: V2, parameters: Parameters) -> wp.bool:
+        """Whether the mixture moves away from the surface."""
+        result = wp.dot(V2(velocity[0], velocity[1]) - surface_velocity, normal)
+        if TWO_PHASE:
+            liquid = wp.dot(V2(velocity[2], velocity[3]) - surface_velocity, normal)
+            result = parameters.solid_density * result + parameters.liquid_density * liquid
+        return result > F(0.0)
+
+    @wp.func
     def add(grid: Grid, i: wp.int32, j: wp.int32, change: V):
         grid.velocity[i, j] += change
         if FLIP:
@@ -156,20 +165,22 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             liquid_free = V2()
             if GROUND_FRICTION:
                 liquid_free = liquid_alone(grid, parameters, i, j, time_step)
+            pair = wp.bool(False)
             if mi != i or mj != j:
                 other = grid.mass[mi, mj]
                 if other > F(0.0):
-                    both = F(4.0) * mass * other / (mass + other)
-                    velocity = F(0.5) * (velocity + grid.velocity[mi, mj])
-                    if GROUND_FRICTION:
-                        liquid_free = F(0.5) * (liquid_free + liquid_alone(grid, parameters, mi, mj, time_step))
-                    change = respond(
-                        both, velocity, liquid_free, normal, friction, V2(), parameters, time_step
-                    )
-                    add(grid, i, j, change * (F(0.5) * both / mass))
-                    add(grid, mi, mj, change * (F(0.5) * both / other))
-                    record(reactions, surface, impulse(both, change, parameters))
-            else:
+                    mean = F(0.5) * (velocity + grid.velocity[mi, mj])
+                    # Where the surface is left but the node behind it is not, it acts alone on what lies behind.
+                    if leaves(velocity, normal, V2(), parameters) or not leaves(mean, normal, V2(), parameters):
+                        pair = wp.bool(True)
+                        both = F(4.0) * mass * other / (mass + other)
+                        if GROUND_FRICTION:
+                            liquid_free = F(0.5) * (liquid_free + liquid_alone(grid, parameters, mi, mj, time_step))
+                        change = respond(both, mean, liquid_free, normal, friction, V2(), parameters, time_step)
+                        add(grid, i, j, change * (F(0.5) * both / mass))
+                        add(grid, mi, mj, change * (F(0.5) * both / other))
+                        record(reactions, surface, impulse(both, change, parameters))
+            if not pair:
                 change = respond(mass, velocity, liquid_free, normal, friction, V2(), parameters, time_step)
                 add(grid, i, j, change)
                 record(reactions, surface, impulse(mass, change, parameters))
@@ -263,15 +274,22 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                 liquid_free = V2()
                 if BARRIER_FRICTION:
                     liquid_free = liquid_alone(grid, parameters, node[0], node[1], time_step)
+                pair = wp.int32(0)
                 if mirror[0] >= 0:
                     other = grid.mass[mirror[0], mirror[1]]
-                    mass = F(4.0) * mass * other / (mass + other)
                     if other > F(0.0):
-                        velocity = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
-                        if BARRIER_FRICTION:
-                            liquid_free = F(0.5) * (
-                                liquid_free + liquid_alone(grid, parameters, mirror[0], mirror[1], time_step)
-                            )
+                        moving = V2(F(clock[wp.static(BARRIER_VELOCITY)]), F(0.0))
+                        normal = contact.normal[e]
+                        mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
+                        if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
+                            pair = wp.int32(1)
+                            mass = F(4.0) * mass * other / (mass + other)
+                            velocity = mean
+                            if BARRIER_FRICTION:
+                                liquid_free = F(0.5) * (
+                                    liquid_free + liquid_alone(grid, parameters, mirror[0], mirror[1], time_step)
+                                )
+                contact.pair[e] = pair
                 contact.velocity[e] = velocity
                 contact.liquid_free[e] = liquid_free
             contact.mass[e] = mass
@@ -292,7 +310,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                     mass, contact.velocity[e], contact.liquid_free[e], contact.normal[e], contact.friction[e],
                     surface_velocity, parameters, time_step,
                 )
-                if mirror[0] >= 0:
+                if contact.pair[e] == 1:
                     add(grid, node[0], node[1], change * (F(0.5) * mass / grid.mass[node[0], node[1]]))
                     add(grid, mirror[0], mirror[1], change * (F(0.5) * mass / grid.mass[mirror[0], mirror[1]]))
                 else:

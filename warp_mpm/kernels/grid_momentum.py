@@ -39,13 +39,15 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
 
     @wp.func
     def dragged(free: V, parameters: Parameters, time_step: F) -> V:
-        """Exchange momentum between the phases, implicitly. Per node and direction the two unknowns decouple into the
-        mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
-        Q (1 / n_S rho_S + 1 / n rho_L)."""
+        """Exchange momentum between the phases, after their own forces. Per node and direction the two unknowns
+        decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
+        Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt."""
         total = parameters.solid_density + parameters.liquid_density
         solid_share = parameters.solid_density / total
         liquid_share = parameters.liquid_density / total
-        lost = parameters.drag_rate * time_step / (F(1.0) + parameters.drag_rate * time_step)
+        lost = parameters.drag_rate * time_step
+        if IMPLICIT_DRAG:
+            lost = lost / (F(1.0) + lost)
         x = lost * (free[2] - free[0])
         y = lost * (free[3] - free[1])
         return free + V(liquid_share * x, liquid_share * y, -solid_share * x, -solid_share * y)
@@ -65,7 +67,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
                     new = free_velocity(grid, parameters, i, j, time_step)
-                    if IMPLICIT_DRAG:
+                    if TWO_PHASE:
                         new = dragged(new, parameters, time_step)
                     grid.velocity[i, j] = new
                     if FLIP:

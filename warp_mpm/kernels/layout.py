@@ -235,6 +235,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         "surface": array(dtype=wp.int32),
         "friction": array(dtype=scalar),
         # Gathered each step, for the barrier's equation of motion.
+        "pair": array(dtype=wp.int32),  # 1: acts with its mirror image
         "mass": array(dtype=scalar),
         "velocity": array(dtype=V),
         "liquid_free": array(dtype=V2),

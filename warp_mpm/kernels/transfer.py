@@ -37,7 +37,6 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
-    EXPLICIT_DRAG = effects.drag == "explicit"
 
     @wp.kernel(module=module)
     def clear(grid: Grid, parameters: Parameters):
@@ -72,21 +71,6 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             if wp.atomic_cas(grid.block, bi, bj, 0, 1) == 0:
                 place = wp.atomic_add(grid.active_count, 0, 1)
                 grid.active[place] = bi * parameters.block_rows + bj
-
-    # Referenced, and so compiled, only with explicit drag.
-    @wp.func
-    def exchange(v: V, parameters: Parameters) -> V:
-        """Explicit drag: force on each phase per volume of mixture."""
-        x = parameters.drag_coefficient * (v[2] - v[0])
-        y = parameters.drag_coefficient * (v[3] - v[1])
-        return V(x, y, -x, -y)
-
-    @wp.func
-    def dragged(v: V, parameters: Parameters, time_step: F) -> V:
-        f = exchange(v, parameters) * time_step
-        solid = parameters.solid_density
-        liquid = parameters.liquid_density
-        return v + V(f[0] / solid, f[1] / solid, f[2] / liquid, f[3] / liquid)
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
@@ -147,8 +131,6 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
         if APIC:
             # The nodes receive the momentum at the end of the step: the force's share of it rides along.
             push = volume * time_step / parameters.solid_density
-            if EXPLICIT_DRAG:
-                velocity = dragged(velocity, parameters, time_step)
             velocity += reference * time_step * gravity
             if TWO_PHASE:
                 liquid_force *= time_step / parameters.liquid_density
@@ -177,9 +159,6 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
         if APIC:
             affine_x = points.affine_x[p] * (parameters.spacing * reference)
             affine_y = points.affine_y[p] * (parameters.spacing * reference)
-            if EXPLICIT_DRAG:
-                affine_x = dragged(affine_x, parameters, time_step)
-                affine_y = dragged(affine_y, parameters, time_step)
 
         # What depends on x alone is formed once per column of nodes.
         for k in range(3):
@@ -200,11 +179,8 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                         wy[m] * column_velocity + (wy[m] * to_y[m]) * column_affine + dy[m] * column_slope
                     )
                 else:
-                    force = wy[m] * column_force + dy[m] * column_slope
-                    if EXPLICIT_DRAG:
-                        force += wy[m] * exchange(column_velocity, parameters)
                     grid.momentum[i, j] += wy[m] * column_velocity
-                    grid.force[i, j] += force
+                    grid.force[i, j] += wy[m] * column_force + dy[m] * column_slope
                 if PORE_FORCE:
                     gx = dx[k] * wy[m]
                     gy = wx[k] * dy[m]
