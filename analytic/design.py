@@ -15,24 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.arrays import outcomes
-from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene
+from analytic.fitted import Coefficients
+from analytic.scene import Scene
 
 Array = NDArray[np.float64]
 
 MASS_RATIOS = (1e-3, 1e4)
 """Mass ratios m2 / m1 between which a barrier is looked for."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Coefficients:
-    """The closed form's numbers for one scene."""
-
-    geometry_change: float = PAPER_GEOMETRY_CHANGE["sliding"]
-    """lambda [-]."""
-    rise_ratio: float = ASSUMED_RISE_RATIO
-    """tau [-]."""
-    vertical_load_ratio: float = 0.0
-    """kappa [-]."""
 
 
 Rule = Callable[[Scene], Coefficients]
@@ -103,6 +92,7 @@ def displacement(scene: Scene, barrier_mass: ArrayLike, coefficients: Coefficien
         geometry_change=coefficients.geometry_change,
         rise_ratio=coefficients.rise_ratio,
         vertical_load_ratio=coefficients.vertical_load_ratio,
+        variant=coefficients.variant,
         gravity=scene.gravity,
     ).barrier_displacement_final
 

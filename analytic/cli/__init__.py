@@ -1,4 +1,4 @@
-"""The command line: `python -m analytic predict | compare | calibrate | field | design`.
+"""The command line: `python -m analytic predict | compare | calibrate | field | design | sweep`.
 
 Exit codes: 0 done, 2 the input cannot be used (one sentence says why, on the standard error stream).
 """
@@ -12,6 +12,7 @@ from analytic.cli.compare import compare
 from analytic.cli.design import design
 from analytic.cli.field import field
 from analytic.cli.predict import predict
+from analytic.cli.sweep import sweep
 
 app = typer.Typer(
     help="Closed-form impact of a debris flow on a rigid barrier which may slide: answers in microseconds.",
@@ -32,6 +33,7 @@ app.command(
     epilog="Example: python -m analytic design --density 1800 --flow-length 15 --flow-height 3 --speed 10 "
     '--base-friction 0.29 --limit 1 --plot chart.png; uncertain: --speed "lognormal(10, 0.2)" --barrier-mass 95000'
 )(design)
+app.add_typer(sweep, name="sweep")
 
 
 def main() -> None:

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from analytic.cli.calibrate import load
-from analytic.cli.predict import make_impact, option
+from analytic.cli.predict import choose_model, make_impact, option
 from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.fitted import CALIBRATED, calibrated_impact
 from analytic.impact import VARIANTS
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, read_scene
 
@@ -35,7 +36,9 @@ def compare(
     ],
     variant: Annotated[
         list[str] | None,
-        typer.Option(help=f"Variant to show, of {', '.join(VARIANTS)}; may be repeated.", show_default="all"),
+        typer.Option(
+            help=f"Variant to show, of {', '.join([*VARIANTS, CALIBRATED])}; may be repeated.", show_default="all"
+        ),
     ] = None,
     geometry_change: Annotated[
         float | None, option("--lambda", "--geometry-change", help="λ [-]. The paper's: 0.72 fixed, 0.41 sliding.")
@@ -48,24 +51,23 @@ def compare(
     as_json: AsJson = False,
     plot: Plot = None,
 ) -> None:
-    """Hold the closed form, without fitting it, against simulations; or its variants against each other.
+    """Hold the closed form, without fitting it to them, against simulations; or its variants against each other.
 
     In brackets: the difference from the simulated value. For one scenario, also what the pressure formulas say of
     the same flow on a fixed barrier.
     """
     with refusals():
         check_plot(plot)
+        known = [*VARIANTS, CALIBRATED]
         for name in variant or ():
-            if name not in VARIANTS:
-                raise ValueError(f"variant is {name!r}, it must be one of {', '.join(VARIANTS)}.")
-        model: dict[str, Any] = {"rise_ratio": rise_ratio}
-        if geometry_change is not None:
-            model["geometry_change"] = geometry_change
+            if name not in known:
+                raise ValueError(f"variant is {name!r}, it must be one of {', '.join(known)}.")
+        given = {"geometry_change": geometry_change, "rise_ratio": rise_ratio}
         scenes: dict[str, Scene] = {}
         found: dict[str, dict[str, Any]] = {}
         for path in paths:
             name = path.stem if path.is_file() else path.name or str(path)
-            found[name], scenes[name] = _figures(path, variant or list(VARIANTS), model, reference_speed, filter_window)
+            found[name], scenes[name] = _figures(path, variant or known, given, reference_speed, filter_window)
         if as_json:
             print_json({name: {source: vars(f) for source, f in rows.items()} for name, rows in found.items()})
         else:
@@ -75,7 +77,11 @@ def compare(
 
 
 def _figures(
-    path: Path, variants: list[str], model: dict[str, Any], reference_speed: float | None, filter_window: float
+    path: Path,
+    variants: list[str],
+    given: dict[str, float | None],
+    reference_speed: float | None,
+    filter_window: float,
 ) -> tuple[dict[str, Any], Scene]:
     """Key figures by source, and the scene, of a run folder or a scenario file."""
     from analytic.calibration import key_figures, measure, measured_key_figures
@@ -87,8 +93,15 @@ def _figures(
         rows[SIMULATED] = measured_key_figures(series, measured)
     else:
         scene = read_scene(path)
-    for name in variants if not scene.fixed else variants[:1]:  # fixed, the variants are one and the same
-        rows[name] = key_figures(make_impact(scene, model | {"variant": name}, reference_speed))
+    for name in variants:
+        if scene.fixed and name in VARIANTS[1:]:
+            continue  # a fixed barrier does not tell them from the first
+        if name == CALIBRATED:
+            impact = calibrated_impact(scene)
+        else:
+            model, _ = choose_model(scene, name, given)
+            impact = make_impact(scene, model, reference_speed)
+        rows[name] = key_figures(impact)
     return rows, scene
 
 

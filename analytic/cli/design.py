@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,6 +35,9 @@ def design(
     vertical_load_ratio: Annotated[
         str, typer.Option("--vertical-load-ratio", help="Vertical over horizontal force [-], likewise.")
     ] = "0",
+    calibrated: Annotated[
+        bool, typer.Option("--calibrated", help="Take λ, τ and the vertical load from the fit to simulations.")
+    ] = False,
     barrier_mass: Annotated[
         str | None, option("--barrier-mass", help="m2 [kg/m] of a given barrier, whose probability is asked for.")
     ] = None,
@@ -90,8 +94,10 @@ def design(
             face_angle=face_angle,
             density=barrier_density,
         )
-        job = _Job(scene, inputs, medians, limit, bounds, samples, seed, as_json, plot)
+        job = _Job(scene, inputs, medians, limit, bounds, samples, seed, calibrated, as_json, plot)
         if any(isinstance(value, Distribution) for value in inputs.values()):
+            if calibrated:
+                raise ValueError("calibrated is for numbers; with distributions give λ, τ and the vertical load.")
             job.uncertain(probability, mass_given=barrier_mass is not None)
         elif probability is not None or barrier_mass is not None:
             name = "probability" if probability is not None else "barrier_mass"
@@ -138,22 +144,28 @@ class _Job:
         bounds: Any,
         samples: int,
         seed: int,
+        calibrated: bool,
         as_json: bool,
         plot: Path | None,
     ):
-        from analytic.design import Coefficients
+        from analytic import fitted
 
         self.scene, self.inputs, self.limit, self.bounds = scene, inputs, limit, bounds
         self.samples, self.seed, self.as_json, self.plot = samples, seed, as_json, plot
+        self.calibrated = calibrated
         names = ("geometry_change", "rise_ratio", "vertical_load_ratio")
-        self.coefficients = Coefficients(**{name: medians[name] for name in names})
+        self.coefficients = fitted.Coefficients(**dict[str, Any]({name: medians[name] for name in names}))
         self.given_mass = medians.get("barrier_mass")
+        self.rule = fitted.coefficients if calibrated else self._constant
+
+    def _constant(self, scene: Scene) -> Any:
+        return self.coefficients
 
     def certain(self) -> None:
         """The lightest trapezoid and the chart."""
         from analytic.design import lightest_barrier
 
-        found = lightest_barrier(self.scene, self.limit, self.bounds, lambda scene: self.coefficients)
+        found = lightest_barrier(self.scene, self.limit, self.bounds, self.rule)
         if self.as_json:
             print_json(
                 {
@@ -166,6 +178,7 @@ class _Job:
                     "displacement": found.displacement,
                     "limit": self.limit,
                     "governed_by": found.governed_by,
+                    "coefficients": found.coefficients.model,
                 }
             )
         else:
@@ -175,14 +188,14 @@ class _Job:
                 ["final displacement", number(found.displacement), "m"],
                 ["governed by", found.governed_by, ""],
             ]
-            print_table(
-                f"Lightest barrier that slides at most {self.limit:g} m",
-                ["quantity", "value", "unit"],
-                rows,
-                ["Of the barrier the closed form sees the mass alone; equally light shapes slide equally far."],
-            )
+            at = found.coefficients
+            notes = [f"λ = {at.geometry_change:.3g}, τ = {at.rise_ratio:.3g}, κ = {at.vertical_load_ratio:.3g}"]
+            if not self.calibrated:
+                notes.append("Of the barrier the closed form sees the mass alone; equally light shapes slide alike.")
+            title = f"Lightest barrier that slides at most {self.limit:g} m"
+            print_table(title, ["quantity", "value", "unit"], rows, notes)
         if self.plot is not None:
-            write_plot(lambda: self._chart(found.mass), self.plot)
+            write_plot(lambda: self._chart(found.mass, found.face_angle), self.plot)
 
     def uncertain(self, probability: float | None, mass_given: bool) -> None:
         """Probability of sliding beyond the limit, and what matters."""
@@ -198,7 +211,7 @@ class _Job:
         elif mass_given:
             mass, which = self.given_mass or 0.0, "given"
         else:
-            found = lightest_barrier(self.scene, self.limit, self.bounds, lambda scene: self.coefficients)
+            found = lightest_barrier(self.scene, self.limit, self.bounds, self.rule)
             mass, which = found.mass, "lightest for the medians"
         shape = None if mass_given else trapezoid(mass, self.bounds)
         if shape is not None:
@@ -244,7 +257,7 @@ class _Job:
 
             write_plot(lambda: plots.reliability(result, self.limit, f"Barrier of {mass:.0f} kg/m"), self.plot)
 
-    def _chart(self, mass: float) -> Any:
+    def _chart(self, mass: float, angle: float) -> Any:
         import numpy as np
 
         from analytic import plots
@@ -253,7 +266,9 @@ class _Job:
         ratio = mass / self.scene.flow_mass
         ratios = np.linspace(min(0.2, 0.5 * ratio), max(3.0, 1.5 * ratio), 60)
         speeds = np.linspace(0.2 * self.scene.speed, 2 * self.scene.speed, 60)
-        moved = chart(self.scene, ratios, speeds, lambda scene: self.coefficients)
+        moved = chart(
+            replace(self.scene, face_angle=angle, barrier_height=self.bounds.height), ratios, speeds, self.rule
+        )
         title = f"Final displacement; L = {self.scene.flow_length:g} m, h = {self.scene.flow_height:g} m"
         return plots.design_chart(ratios, speeds, moved, self.limit, (ratio, self.scene.speed), title)
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.fitted import CALIBRATED, beyond_fit, coefficients
 from analytic.impact import STANDARD_GRAVITY, VARIANTS, Impact
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, read_scene
 
@@ -39,9 +40,14 @@ def predict(
         float | None, option("--tau", "--rise-ratio", help=f"τ = T1 / T2 [-]; {ASSUMED_RISE_RATIO} is assumed.")
     ] = None,
     vertical_load_ratio: Annotated[
-        float, typer.Option("--vertical-load-ratio", help="Vertical over horizontal force on the barrier [-].")
-    ] = 0.0,
-    variant: Annotated[str, typer.Option("--variant", help=f"One of {', '.join(VARIANTS)}.")] = VARIANTS[0],
+        float | None, option("--vertical-load-ratio", help="Vertical over horizontal force on the barrier [-]; 0.")
+    ] = None,
+    variant: Annotated[str, typer.Option("--variant", help=f"One of {', '.join([*VARIANTS, CALIBRATED])}.")] = VARIANTS[
+        0
+    ],
+    face_angle: Annotated[
+        float | None, option("--face-angle", help="β of the impacted face [degrees], for the calibrated variant.")
+    ] = None,
     reference_speed: Annotated[
         float | None,
         option("--reference-speed", help="Speed [m/s] for which λ and τ are given; scales them to --speed (§3.2)."),
@@ -64,32 +70,26 @@ def predict(
             "speed": speed,
             "base_friction": base_friction,
             "gravity": gravity,
+            "face_angle": face_angle,
         }
         scene = assemble(scenario, given, fixed)
         notes = list(scene.remarks)
-        model: dict[str, Any] = {
-            "barrier_initial_velocity": barrier_initial_velocity,
+        given_model = {
+            "s1max": s1max,
+            "geometry_change": geometry_change,
+            "rise_ratio": rise_ratio,
             "vertical_load_ratio": vertical_load_ratio,
-            "variant": variant,
-            "arrival_time": arrival_time,
         }
-        if s1max is not None:
-            model["s1max"] = s1max
-        if geometry_change is not None:
-            model["geometry_change"] = geometry_change
-        if s1max is None and geometry_change is None:
-            notes.append(f"λ = {scene.paper_geometry_change} is the paper's for this kind of barrier.")
-        if rise_ratio is None:
-            notes.append(f"τ = {ASSUMED_RISE_RATIO} is assumed; the paper names no value.")
-        else:
-            model["rise_ratio"] = rise_ratio
+        model, assumed = choose_model(scene, variant, given_model)
+        notes += assumed
+        model |= {"barrier_initial_velocity": barrier_initial_velocity, "arrival_time": arrival_time}
         impact = make_impact(scene, model, reference_speed)
         if as_json:
             print_json(_results(impact) | {"inputs": _inputs(impact), "notes": notes})
         else:
-            _print(impact, scene, notes)
+            _print(impact, _title(impact, scene, variant), notes)
         if plot is not None:
-            write_plot(lambda: _figure(impact, scene), plot)
+            write_plot(lambda: _figure(impact, variant, _title(impact, scene, variant)), plot)
 
 
 def assemble(scenario: Path | None, given: dict[str, float | None], fixed: bool) -> Scene:
@@ -106,6 +106,28 @@ def assemble(scenario: Path | None, given: dict[str, float | None], fixed: bool)
     if not fixed and "barrier_mass" not in stated:
         raise ValueError("barrier_mass is missing, give --barrier-mass, --fixed or a scenario file.")
     return Scene(**dict[str, Any](stated))
+
+
+def choose_model(scene: Scene, variant: str, given: dict[str, float | None]) -> tuple[dict[str, Any], list[str]]:
+    """Arguments of ``Scene.impact`` for a variant, the calibrated one included, and what is assumed, in sentences.
+
+    ``given``: what the user states of s1max, geometry_change, rise_ratio and vertical_load_ratio; it goes before the
+    fitted or assumed values.
+    """
+    stated = {name: value for name, value in given.items() if value is not None}
+    lambda_stated = "s1max" in stated or "geometry_change" in stated
+    if variant == CALIBRATED:
+        model = coefficients(scene).model
+        if lambda_stated:
+            del model["geometry_change"]
+        fitted = "λ, τ and the vertical load are fitted to simulations; see docs/closed_form.md for their errors."
+        return model | stated, [fitted, *beyond_fit(scene)]
+    notes = []
+    if not lambda_stated:
+        notes.append(f"λ = {scene.paper_geometry_change} is the paper's for this kind of barrier.")
+    if "rise_ratio" not in stated:
+        notes.append(f"τ = {ASSUMED_RISE_RATIO} is assumed; the paper names no value.")
+    return {"variant": variant, **stated}, notes
 
 
 def make_impact(scene: Scene, model: dict[str, Any], reference_speed: float | None) -> Impact:
@@ -156,27 +178,28 @@ def _inputs(impact: Impact) -> dict[str, Any]:
     }
 
 
-def _title(impact: Impact, scene: Scene) -> str:
-    barrier = "fixed barrier" if impact.fixed else f"sliding barrier, {impact.variant}"
-    return f"{scene.title or 'Impact'}; {barrier}"
+def _title(impact: Impact, scene: Scene, variant: str) -> str:
+    return f"{scene.title or ('Fixed barrier' if impact.fixed else 'Sliding barrier')}; {variant}"
 
 
-def _print(impact: Impact, scene: Scene, notes: list[str]) -> None:
+def _print(impact: Impact, title: str, notes: list[str]) -> None:
     rows = [[label, number(getattr(impact, name) * factor, 6), unit] for name, (label, unit, factor) in RESULTS.items()]
     inputs = (
         f"m1 = {impact.flow_mass:g} kg/m, m2 = {'fixed' if impact.fixed else f'{impact.barrier_mass:g} kg/m'}, "
         f"L = {impact.flow_length:g} m, h = {impact.flow_height:g} m, v = {impact.speed:g} m/s, "
-        f"λ = {impact.geometry_change_length / impact.flow_length:g}, τ = {impact.rise_ratio:g}"
+        f"λ = {impact.geometry_change_length / impact.flow_length:.4g}, τ = {impact.rise_ratio:.4g}"
     )
     if not impact.fixed:
         inputs += f", tan δ_b = {impact.base_friction:g}"
+    if impact.vertical_load_ratio:
+        inputs += f", κ = {impact.vertical_load_ratio:.4g}"
     if impact.variant == "as_printed":
         notes = [*notes, "as_printed: the paper's formulas to the letter, which break momentum; for comparison only."]
     clock = "Times count from the arrival of the flow." if impact.arrival_time == 0 else ""
-    print_table(_title(impact, scene), ["quantity", "value", "unit"], rows, [inputs, *filter(None, [clock]), *notes])
+    print_table(title, ["quantity", "value", "unit"], rows, [inputs, *filter(None, [clock]), *notes])
 
 
-def _figure(impact: Impact, scene: Scene) -> Any:
+def _figure(impact: Impact, variant: str, title: str) -> Any:
     from analytic import plots
 
-    return plots.impacts({impact.variant: impact}, _title(impact, scene))
+    return plots.impacts({variant: impact}, title)

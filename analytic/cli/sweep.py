@@ -1,0 +1,127 @@
+"""`python -m analytic sweep plan | collect | fit`: from simulations to the constants of the variant ``calibrated``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from analytic.cli.terminal import AsJson, number, print_json, print_table, refusals
+
+sweep = typer.Typer(help="Fit the calibrated variant to a sweep of simulations.", no_args_is_help=True)
+
+
+@sweep.command(epilog="Example: python -m analytic sweep plan scenarios/set_i.json sweep --count 256")
+def plan(
+    template: Annotated[Path, typer.Argument(help="Scenario whose material and contact are kept.")],
+    folder: Annotated[Path, typer.Argument(help="Folder for the scenario files; made if it is not there.")],
+    count: Annotated[int, typer.Option(help="Number of scenes.")] = 256,
+    seed: Annotated[int, typer.Option(help="Of the Sobol' sequence.")] = 1,
+) -> None:
+    """Write scenario files spread over speed, depth, length, porosity, face angle, height, mass and base friction.
+
+    Run each with: python -m warp_mpm run sweep/scene_000.json --out sweep/runs/scene_000
+    """
+    with refusals():
+        from analytic import sweep as scenes
+        from analytic.scene import read_scene
+
+        read_scene(template)  # its errors name file and field
+        content = json.loads(template.read_text(encoding="utf-8-sig"))
+        if content["flow"]["formulation"] != "two_phase":
+            raise ValueError(
+                f"{template} has the formulation {content['flow']['formulation']!r}, it must be two_phase."
+            )
+        planned = scenes.plan(content, count, seed)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, scene in planned.items():
+            (folder / f"{name}.json").write_text(json.dumps(scene, indent=2) + "\n", encoding="utf-8")
+        typer.echo(f"{len(planned)} scenarios in {folder}")
+
+
+@sweep.command(epilog="Example: python -m analytic sweep collect sweep/runs/* --out docs/data/sweep.csv")
+def collect(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="CSV file to write.", show_default=False)],
+    remark: Annotated[str, typer.Option(help="First line of the file, as a comment.")] = "",
+) -> None:
+    """Gather what the runs say into one table; a folder without a usable record is named and left out."""
+    with refusals():
+        from analytic import sweep as scenes
+
+        rows = []
+        for path in sorted(runs):
+            try:
+                rows.append(scenes.collect(path))
+            except ValueError as error:
+                typer.echo(f"Left out: {error}", err=True)
+        if not rows:
+            raise ValueError("No folder holds a usable record.")
+        scenes.write_table(rows, out, remark)
+        typer.echo(f"{len(rows)} of {len(runs)} runs in {out}")
+
+
+@sweep.command(epilog="Example: python -m analytic sweep fit docs/data/sweep.csv")
+def fit(
+    table: Annotated[Path, typer.Argument(help="Table of the sweep.")],
+    as_json: AsJson = False,
+) -> None:
+    """Fit the constants and say how well they predict scenes they were not fitted to."""
+    with refusals():
+        from analytic import sweep as scenes
+        from analytic import sweep_fit
+
+        runs = scenes.read_table(table)
+        content: dict[str, Any] = {}
+        rows = []
+        for kind, fixed in (("sliding", False), ("fixed", True)):
+            usable = sweep_fit.usable(runs, fixed)
+            if len(usable) < 4 * sweep_fit.FOLDS:
+                raise ValueError(f"{table} holds {len(usable)} usable runs with a {kind} barrier, a fit needs 20.")
+            before = sweep_fit.score(usable, [sweep_fit.paper_rule(run.scene) for run in usable])
+            after = sweep_fit.score(usable, sweep_fit.cross_validated(usable))
+            constants = sweep_fit.fit(usable)
+            content[kind] = {"constants": vars(constants), "paper": vars(before), "calibrated": vars(after)}
+            rows += [_row(f"{kind}, paper's constants", before), _row(f"{kind}, calibrated", after)]
+        if as_json:
+            print_json(content)
+            return
+        header = [
+            "rule",
+            "runs",
+            "F: |error|",
+            "bias",
+            "T1: |error|",
+            "moved",
+            "Δx: |error|",
+            "bias",
+            "spread",
+            "within 2x",
+        ]
+        notes = [
+            "Medians; the calibrated ones by five-fold cross-validation, each run with constants fitted without it.",
+            "Δx: of the barriers that moved by a tenth of the depth; spread: exp of the root mean square log ratio.",
+            *(f"{kind}: {found['constants']}" for kind, found in content.items()),
+        ]
+        print_table("Closed form against simulations", header, rows, notes)
+
+
+def _row(name: str, found: Any) -> list[str]:
+    def percent(value: float) -> str:
+        return f"{100 * value:.0f} %"
+
+    slides = found.moved > 0
+    return [
+        name,
+        str(found.runs),
+        percent(found.peak_force_median),
+        number(found.peak_force_bias, 3),
+        percent(found.rise_time_median),
+        str(found.moved) if slides else "–",
+        f"{number(found.displacement_median, 3)} m" if slides else "–",
+        number(found.displacement_bias, 3),
+        number(found.displacement_factor, 3),
+        percent(found.within_two) if slides else "–",
+    ]

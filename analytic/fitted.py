@@ -1,0 +1,143 @@
+"""The variant ``calibrated``: the closed form's numbers as functions of the scene, fitted to simulations.
+
+The paper takes lambda for a constant, 0.72 fixed and 0.41 sliding, and leaves the vertical load out. A sweep of
+simulations (``analytic.sweep``) says instead
+
+    lambda = (3/4) (m2/m1)^c / (a (1 - cos beta) + b / Fr)             (without m2/m1 where the barrier is fixed)
+    T1 v / h = t (L/h)^p (1 - cos beta)^q,       tau = T1 / T2
+    kappa = cot(beta)
+
+in the variant ``momentum_closed``. The denominator is F_peak / (rho h v^2): a jet that the face turns by beta, and the
+weight of the flow. A smooth face passes on its normal force alone, hence kappa. ``docs/closed_form.md`` tells how well
+this does on scenes that were not fitted. Standard library only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from analytic.impact import Impact
+from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene
+
+CALIBRATED = "calibrated"
+"""Name of the variant."""
+
+BASE_VARIANT = "momentum_closed"
+"""Variant of ``Impact`` for which the constants are fitted."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coefficients:
+    """The closed form's numbers for one scene."""
+
+    geometry_change: float = PAPER_GEOMETRY_CHANGE["sliding"]
+    """lambda [-]."""
+    rise_ratio: float = ASSUMED_RISE_RATIO
+    """tau [-]."""
+    vertical_load_ratio: float = 0.0
+    """kappa [-]."""
+    variant: str = "stick_slip"
+    """Variant of ``Impact``."""
+
+    @property
+    def model(self) -> dict[str, Any]:
+        """As arguments of ``Scene.impact``."""
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constants:
+    """Fitted constants, dimensionless; see the formulas above."""
+
+    jet: float
+    """a."""
+    weight: float
+    """b."""
+    mass_exponent: float
+    """c; 0 where the barrier is fixed."""
+    rise: float
+    """t."""
+    rise_length_exponent: float
+    """p."""
+    rise_angle_exponent: float
+    """q."""
+
+
+CONSTANTS = {
+    "sliding": Constants(
+        jet=1.368, weight=0.565, mass_exponent=0.174, rise=0.303, rise_length_exponent=0.559, rise_angle_exponent=-0.945
+    ),
+    "fixed": Constants(
+        jet=0.991, weight=0.865, mass_exponent=0.000, rise=0.289, rise_length_exponent=0.559, rise_angle_exponent=-1.161
+    ),
+}
+"""Fitted by ``python -m analytic sweep fit docs/data/sweep.csv``."""
+
+FITTED_RANGES = {
+    "froude_number": ("Fr", 1.0, 5.0),
+    "length_ratio": ("L/h", 3.0, 10.0),
+    "height_ratio": ("H/h", 1.25, 4.0),
+    "face_angle": ("beta", 50.0, 90.0),
+    "mass_ratio": ("m2/m1", 0.5, 3.0),
+    "base_friction": ("tan(delta_b)", 0.2, 0.5),
+}
+"""Ranges of the fitted scenes: symbol, least and greatest value."""
+
+GREATEST_FRICTION_SHARE = 0.95
+"""Bound of kappa tan(delta_b), beyond which the flow's own weight would hold the barrier."""
+
+
+def coefficients(scene: Scene, constants: Constants | None = None) -> Coefficients:
+    """The fitted numbers of a scene; ``constants`` other than the fitted ones serve the fit itself.
+
+    lambda and tau are cut off at 1.
+
+    Raises
+    ------
+    ValueError: the scene's face angle is not known.
+    """
+    if scene.face_angle is None or not 0 < scene.face_angle <= 90:
+        raise ValueError(f"face_angle is {scene.face_angle}, the calibrated variant needs a number in (0, 90] degrees.")
+    at = constants or CONSTANTS["fixed" if scene.fixed else "sliding"]
+    beta = math.radians(scene.face_angle)
+    turned = 1 - math.cos(beta)
+    mass_ratio = 1.0 if scene.barrier_mass is None else scene.barrier_mass / scene.flow_mass
+    denominator = at.jet * turned + at.weight / scene.froude_number
+    geometry_change = min(0.75 * mass_ratio**at.mass_exponent / denominator, 1.0)
+    length_ratio = scene.flow_length / scene.flow_height
+    rise_time = at.rise * length_ratio**at.rise_length_exponent * turned**at.rise_angle_exponent
+    # T2 v / h = (8/3) lambda L / h, Eq. (8).
+    rise_ratio = min(rise_time / (8 / 3 * geometry_change * length_ratio), 1.0)
+    kappa = 0.0
+    if not scene.fixed:
+        kappa = 1 / math.tan(beta) if scene.face_angle < 90 else 0.0
+        if scene.base_friction:
+            kappa = min(kappa, GREATEST_FRICTION_SHARE / scene.base_friction)
+    return Coefficients(
+        geometry_change=geometry_change, rise_ratio=rise_ratio, vertical_load_ratio=kappa, variant=BASE_VARIANT
+    )
+
+
+def calibrated_impact(scene: Scene, **model: Any) -> Impact:
+    """The impact with the fitted numbers; ``model`` holds what else ``Scene.impact`` takes."""
+    return scene.impact(**{**coefficients(scene).model, **model})
+
+
+def beyond_fit(scene: Scene) -> list[str]:
+    """One sentence for each figure of the scene that lies outside the range of the fitted ones."""
+    values = {
+        "froude_number": scene.froude_number,
+        "length_ratio": scene.flow_length / scene.flow_height,
+        "height_ratio": None if scene.barrier_height is None else scene.barrier_height / scene.flow_height,
+        "face_angle": scene.face_angle,
+        "mass_ratio": None if scene.barrier_mass is None else scene.barrier_mass / scene.flow_mass,
+        "base_friction": None if scene.fixed else scene.base_friction,
+    }
+    found = []
+    for name, value in values.items():
+        symbol, low, high = FITTED_RANGES[name]
+        if value is not None and not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+            found.append(f"{symbol} = {value:.3g} is outside the fitted range {low:g} to {high:g}.")
+    return found
