@@ -1,4 +1,4 @@
-"""From planned scenes to fitted constants: scenes that can be run, a fit that finds what made a table, held-out scores."""
+"""From planned scenes to fitted constants: scenes that can be run, a fit that finds what made a table."""
 
 import json
 import math
