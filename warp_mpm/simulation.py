@@ -539,9 +539,9 @@ class Simulation:
         }
         if self.effects.liquid:
             values["pore_pressure_max_anywhere"] = sums[at.LEDGER_PRESSURE_MAX]
-            # What loads the barrier: where a jet lands behind it, single points meet the ground at water-hammer pressure.
-            upstream = at.LEDGER_PRESSURE_UPSTREAM if self.effects.barrier != "none" else at.LEDGER_PRESSURE_MAX
-            values["pore_pressure_max"] = sums[upstream]
+            # What loads the barrier: upstream of the crest's end and meant over a cell. Where a jet lands behind it,
+            # single points meet the ground at water-hammer pressure.
+            values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MEAN]
         if self.effects.two_phase:
             values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
         values |= {

@@ -42,8 +42,11 @@ DEFINITIONS = {
     "impact_duration": "T2: impact_end_time less impact_start_time",
     "impulse": "time integral of the horizontal force on the impacted face over the whole run",
     "impact_impulse": "the same from impact_start_time to impact_end_time",
-    "pore_pressure_max": "greatest pore pressure of any material point upstream of the barrier's crest, at any sample",
-    "pore_pressure_max_anywhere": "the same of all material points, those of a landing jet included",
+    "pore_pressure_max": (
+        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their noise "
+        "about the mean over a cell"
+    ),
+    "pore_pressure_max_anywhere": "greatest pore pressure of any single material point, noise and landing jets included",
     "retained_volume": "material upstream of the crest at the end, at the flow's initial density",
     "on_crest_volume": "material above the crest at the end",
     "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",

@@ -167,11 +167,11 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             if RELAXATION:
                 # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
                 # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
-                old = points.liquid_strain[p]
-                residual = points.pressure_residual[p]
-                excess = -parameters.liquid_bulk_modulus * old - parameters.true_liquid_density * wp.dot(
-                    parameters.gravity, x
+                pressure = wp.max(
+                    -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
                 )
+                excess = pressure - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                residual = points.pressure_residual[p]
                 whole = least_filling > F(0.6)
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
                 points.pressure_residual[p] = wp.where(whole, excess - smooth_excess, F(0.0))

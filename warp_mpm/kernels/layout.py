@@ -82,7 +82,8 @@ LEDGER_PRESSURE_MAX = 5
 LEDGER_SOLID_MASS = 6
 LEDGER_LIQUID_MASS = 7
 LEDGER_SPEED_MAX = 8
-LEDGER_PRESSURE_UPSTREAM = 9
+LEDGER_PRESSURE_MEAN = 9
+"""Greatest pressure upstream of the crest's end, less its noise about the mean over a cell."""
 LEDGER_NOT_FINITE = 10
 """Material points of which some quantity is not a finite number."""
 LEDGER_SIZE = 11

@@ -14,7 +14,7 @@ from .layout import (
     GRID_SHIFT,
     LEDGER_NOT_FINITE,
     LEDGER_PRESSURE_MAX,
-    LEDGER_PRESSURE_UPSTREAM,
+    LEDGER_PRESSURE_MEAN,
     LEDGER_SOLID_MASS,
     LEDGER_SPEED_MAX,
 )
@@ -28,6 +28,7 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
+    RELAXATION = effects.pressure_relaxation
     BARRIER = effects.barrier != "none"
 
     @wp.kernel(module=module)
@@ -73,9 +74,13 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 F(0.5) * volume * parameters.porosity * pressure * pressure / parameters.liquid_bulk_modulus
             )
             wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), wp.float64(pressure))
+            upstream = wp.bool(True)
             if BARRIER:
-                if wp.float64(points.position[p][0]) < parameters.crest_end + clock[wp.static(GRID_SHIFT)]:
-                    wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_UPSTREAM), wp.float64(pressure))
+                upstream = wp.float64(points.position[p][0]) < parameters.crest_end + clock[wp.static(GRID_SHIFT)]
+            if upstream:
+                if RELAXATION:
+                    pressure -= points.pressure_residual[p]
+                wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MEAN), wp.float64(pressure))
         if not sound:
             wp.atomic_add(sums, wp.static(LEDGER_NOT_FINITE), wp.float64(1.0))
         wp.atomic_add(sums, wp.static(LEDGER_KINETIC), wp.float64(F(0.5) * kinetic))

@@ -281,10 +281,10 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             if RELAXATION:
                 residual = points.pressure_residual[p]
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
-                excess = (
-                    -parameters.liquid_bulk_modulus * points.liquid_strain[p]
-                    - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                pressure = wp.max(
+                    -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
                 )
+                excess = pressure - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
             for k in range(2):
                 for m in range(2):
                     h = hx[k] * hy[m] * reference
