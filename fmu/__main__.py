@@ -63,7 +63,7 @@ def build(
     try:
         for unit in archive.PYTHON_UNITS:
             if unit.name in chosen:
-                _tell(archive.build_python_unit(unit, out, scenario=scenario))
+                _tell(archive.build_python_unit(unit, out, scenario=scenario, simulate_reference=True))
         if c_unit.INTERFACE.name in chosen:
             _tell(c_unit.build_c_unit(out, platforms=tuple(platform) if platform else None))
     except archive.BuildError as error:

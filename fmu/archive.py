@@ -20,9 +20,10 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from fmu import documentation
+from fmu import documentation, reference
 from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface
+from fmu.units.slave import UnitError
 from fmu.units.worker_process import RECORD
 
 PROJECT = "warp-mpm-impact"
@@ -41,6 +42,13 @@ _WRAPPER_FAULTS = {
 """By the SHA-256 of a wrapper: offset in the file, the byte that stands there, and the byte to put there."""
 
 _SCRIPT = """\
+import sys
+
+if sys.version_info < (3, 10):
+    found = "{{}}.{{}}".format(*sys.version_info)
+    sys.stderr.write("{unit.name} needs Python 3.10 or later in the importer's process, this is " + found + ".\\n")
+    raise ImportError("Python 3.10 or later is needed")
+
 from {package}.{unit.module} import {unit.slave}
 from {package}.slave import keep_alive
 
@@ -94,7 +102,12 @@ def project_version() -> str:
 
 
 def build_python_unit(
-    unit: PythonUnit, folder: Path, *, version: str | None = None, scenario: Path | None = None
+    unit: PythonUnit,
+    folder: Path,
+    *,
+    version: str | None = None,
+    scenario: Path | None = None,
+    simulate_reference: bool = False,
 ) -> Path:
     """Build ``folder/<name>.fmu``.
 
@@ -104,6 +117,8 @@ def build_python_unit(
     folder: created if missing; an archive of the same name in it is replaced.
     version: instead of the project's version.
     scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
+    simulate_reference: run the simulator for the reference results of ``DebrisFlow``; those of the other units are
+        always there.
 
     Raises
     ------
@@ -128,7 +143,10 @@ def build_python_unit(
             entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
         entries = {name: _mended(data) for name, data in _own_pythonfmu(entries, package).items()}
         if unit.name == "DebrisFlow":
-            entries |= _simulator_resources(scenario or DEFAULT_SCENARIO)
+            own = _simulator_resources(scenario or DEFAULT_SCENARIO)
+            entries |= {f"resources/{name}": data for name, data in own.items()}
+            if simulate_reference:
+                entries |= _simulated_reference(stage / "reference", own)
         entries |= documentation.entries(unit.interface, version)
         return write_archive(folder / f"{unit.name}.fmu", entries)
 
@@ -176,12 +194,25 @@ def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
 
 def _simulator_resources(scenario: Path) -> dict[str, bytes]:
     """The scenario that runs unless the importer names another, and which Python has the simulator."""
+    if not scenario.is_file():
+        raise BuildError(f"The scenario {scenario} is not there; name one with --scenario.")
     record = {"interpreter": sys.executable, "import_path": [str(_ROOT)]}
     return {
-        f"resources/{SCENARIO}": scenario.read_bytes(),
-        f"resources/{RECORD}": json.dumps(record, indent=2).encode(),
-        "resources/requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
+        SCENARIO: scenario.read_bytes(),
+        RECORD: json.dumps(record, indent=2).encode(),
+        "requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
     }
+
+
+def _simulated_reference(folder: Path, resources: Mapping[str, bytes]) -> dict[str, bytes]:
+    folder.mkdir()
+    for name, data in resources.items():
+        (folder / name).write_bytes(data)
+    try:
+        files = reference.simulated_files(folder)
+    except UnitError as error:
+        raise BuildError(str(error)) from None
+    return {f"documentation/{name}": data for name, data in files.items()}
 
 
 def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, bytes]:

@@ -23,12 +23,11 @@ def entries(interface: Interface, version: str, *, packer: str = "pythonfmu") ->
     """Documentation page, licences, icon and reference results of a unit, by their names in the archive."""
     found = {
         "documentation/index.html": page(interface, version).encode(),
-        "documentation/licenses/license.txt": (_ROOT / "LICENSE").read_bytes(),
+        "documentation/licenses/license.txt": _own_licence(),
         "model.png": (_ASSETS / "icon.png").read_bytes(),
     }
     if packer == "pythonfmu":
         found["documentation/licenses/pythonfmu.txt"] = _licence_of("pythonfmu")
-    # The C unit carries the FMI headers, whose licence is the text at their top.
     return found | {f"documentation/{name}": data for name, data in reference.files(interface).items()}
 
 
@@ -76,6 +75,11 @@ def _start(variable: Variable) -> str:
 def _range(variable: Variable) -> str:
     bounded = variable.minimum is not None or variable.maximum is not None
     return variable.range_text if variable.choice or bounded else ""
+
+
+def _own_licence() -> bytes:
+    checkout = _ROOT / "LICENSE"
+    return checkout.read_bytes() if checkout.is_file() else _licence_of("warp-mpm-impact")
 
 
 def _licence_of(distribution: str) -> bytes:

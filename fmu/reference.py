@@ -7,10 +7,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
-from fmu.units import barrier_sliding, ground_anchor
+from fmu.units import barrier_sliding, debris_flow, ground_anchor
 from fmu.units.interface import Interface
-from fmu.units.slave import UnitSlave
+from fmu.units.slave import UnitError, UnitSlave
 
 InputHistory = Callable[[float], dict[str, float]]
 
@@ -36,40 +37,69 @@ _CASES: dict[str, tuple[type[UnitSlave], InputHistory]] = {
 }
 
 
+SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE = 1.0, 0.05, 0.01
+"""End and communication step [s] of the simulator's reference run, and how near another machine must come to it."""
+
+
 def files(interface: Interface) -> dict[str, bytes]:
-    """The reference files of a unit by name; none for a unit whose results are not the same on every machine."""
+    """The reference files of a unit by name; none for the simulator's, see ``simulated_files``."""
     if interface.name not in _CASES:
         return {}
     slave_class, inputs = _CASES[interface.name]
     slave = slave_class(instance_name="reference", resources="")
-    steps = round(interface.stop_time / interface.step_size)
-    names = [v.name for v in interface.of("output")]
-    input_lines = [_header(["time", *(v.name for v in interface.of("input"))])]
-    output_lines = [_header(["time", *names])]
-    slave.setup_experiment(0.0, interface.stop_time, None)
+    return _run(slave, interface, inputs, interface.stop_time, interface.step_size, 1e-9)
+
+
+def simulated_files(resources: Path) -> dict[str, bytes]:
+    """The reference files of ``DebrisFlow`` with the scenario in ``resources``.
+
+    Raises
+    ------
+    UnitError: the simulator cannot run it.
+    """
+    slave = debris_flow.DebrisFlowSlave(instance_name="reference", resources=str(resources))
+    still = {v.name: 0.0 for v in debris_flow.INTERFACE.of("input")}
+    try:
+        return _run(
+            slave, debris_flow.INTERFACE, lambda time: still, SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE
+        )
+    finally:
+        slave.close()
+
+
+def _run(
+    slave: UnitSlave, interface: Interface, inputs: InputHistory, end: float, step: float, tolerance: float
+) -> dict[str, bytes]:
+    # The simulator's speed is its machine's, and a text has no place in a table of numbers.
+    names = [v.name for v in interface.of("output") if v.name != "time_ratio" and v.kind != "String"]
+    input_names = [v.name for v in interface.of("input")]
+    input_lines, output_lines = [_header(["time", *input_names])], [_header(["time", *names])]
+    slave.setup_experiment(0.0, end, None)
     slave.enter_initialization_mode()
-    for step in range(steps + 1):
-        time = step * interface.step_size
-        if step == 0:
+    count = round(end / step)
+    for number in range(count + 1):
+        time = number * step
+        if number == 0:
             _apply(slave, inputs(0.0))
             slave.exit_initialization_mode()
-        output_lines.append(_row(time, *(slave[name] for name in names)))
+        output_lines.append(_row(time, *(_value(slave, name) for name in names)))
         given = inputs(time)
-        input_lines.append(_row(time, *(given[v.name] for v in interface.of("input"))))
+        input_lines.append(_row(time, *(given[name] for name in input_names)))
         _apply(slave, given)
-        if step < steps and not slave.do_step(time, interface.step_size):
-            raise RuntimeError(f"The reference run of {interface.name} failed at {time:g} s.")
-    options = {
-        "StartTime": 0.0,
-        "StopTime": interface.stop_time,
-        "StepSize": interface.step_size,
-        "RelTol": 1e-9,
-    }
+        if number < count and not slave.do_step(time, step):
+            raise UnitError(f"The reference run of {interface.name} failed at {time:g} s.")
+    options = {"StartTime": 0.0, "StopTime": end, "StepSize": step, "RelTol": tolerance}
     return {
         f"{interface.name}_in.csv": "".join(input_lines).encode(),
         f"{interface.name}_ref.csv": "".join(output_lines).encode(),
         f"{interface.name}_ref.opt": "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode(),
     }
+
+
+def _value(slave: UnitSlave, name: str) -> float:
+    variable = slave.interface.variables[slave.interface.references[name]]
+    getter = {"Real": slave.get_real, "Integer": slave.get_integer, "Boolean": slave.get_boolean}[variable.kind]
+    return getter([slave.interface.references[name]])[0]
 
 
 def _apply(slave: UnitSlave, values: dict[str, float]) -> None:

@@ -13,6 +13,7 @@ import argparse
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
@@ -64,6 +65,8 @@ class Row:
     barrier_velocity: float
     barrier_displacement: float
     anchor_force: float
+    wall_time: float
+    """Since the first step began [s]."""
 
 
 def run_coupled(
@@ -87,7 +90,8 @@ def run_coupled(
         archives / "BarrierSliding.fmu", impact_force_source=2, barrier_mass=barrier_mass, base_friction=0.29
     )
     tie = Unit(archives / "GroundAnchor.fmu", **(anchor or {"slack": 1e3}))
-    rows = [Row(0.0, 0.0, 0.0, 0.0, 0.0)]
+    rows = [Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
+    started = perf_counter()
     try:
         for number in range(round(end / step)):
             time = number * step
@@ -111,6 +115,7 @@ def run_coupled(
                     barrier["barrier_velocity"],
                     barrier["barrier_displacement"],
                     tie["force"],
+                    perf_counter() - started,
                 )
             )
     finally:

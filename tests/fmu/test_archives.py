@@ -6,6 +6,7 @@ import ast
 import csv
 import hashlib
 import io
+import json
 import subprocess
 import sys
 import textwrap
@@ -19,7 +20,8 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from fmu import archive, c_unit, reference
+from fmu import archive, c_unit
+from fmu.check import check_archive
 
 NAMES = [*(unit.name for unit in archive.PYTHON_UNITS), "BarrierSlidingC"]
 EACH = pytest.mark.parametrize("name", NAMES)
@@ -156,9 +158,20 @@ def _table(text: str) -> tuple[list[str], list[list[float]]]:
     return rows[0], [[float(cell) for cell in row] for row in rows[1:]]
 
 
-def test_reference_has_a_case_for_each_unit_that_needs_no_simulator() -> None:
-    for unit in archive.PYTHON_UNITS:
-        assert bool(reference.files(unit.interface)) is (unit.name != "DebrisFlow")
+def test_reference_of_the_simulator_is_reproduced(tmp_path: Path) -> None:
+    """With a coarse scenario inside; bit for bit on one machine, also from a second build."""
+    scenario = json.loads(archive.DEFAULT_SCENARIO.read_text())
+    scenario["numerics"]["spacing_m"] = 1.0
+    path = tmp_path / "coarse.json"
+    path.write_text(json.dumps(scenario))
+    (unit,) = (unit for unit in archive.PYTHON_UNITS if unit.name == "DebrisFlow")
+    built = [
+        archive.build_python_unit(unit, tmp_path / str(i), scenario=path, simulate_reference=True) for i in range(2)
+    ]
+    assert built[0].read_bytes() == built[1].read_bytes()
+    (result,) = (r for r in check_archive(built[0]) if r.name == "reference results")
+    assert result.passed, result.detail
+    assert result.detail == "reproduced to 0e+00"
 
 
 @EACH_PYTHON

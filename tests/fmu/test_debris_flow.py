@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
@@ -460,24 +461,29 @@ def test_instances_do_not_disturb_each_other(open_unit: Open) -> None:
 
 @pytest.mark.slow
 def test_unit_costs_at_most_5_percent(open_unit: Open) -> None:
-    """At the paper's spacing and a communication step of 10 ms, outputs read as an importer does; the best of three."""
+    """At the paper's spacing and a communication step of 10 ms, outputs read as an importer does.
+
+    Each run does the same work in the same steps, so the least time of each step over the rounds is compared: what else
+    the machine does meanwhile drops out.
+    """
     scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json")
     names = [name for name in REPRODUCIBLE if name != "overtopped_volume"]  # counted only for those who ask
-    plain, coupled = math.inf, math.inf
-    for _ in range(3):
+    count, rounds = 100, 12
+    plain, coupled = np.full(count, np.inf), np.full(count, np.inf)
+    for _ in range(rounds):
         simulation = Simulation(scenario)
         simulation.advance(until=1e-9)
-        started = time.perf_counter()
-        for step in range(1, 201):
-            simulation.advance(until=step * 0.01)
-            simulation.sample()
-        plain = min(plain, time.perf_counter() - started)
         host = open_unit("DebrisFlow").initialize()
-        started = time.perf_counter()
-        for _ in range(200):
+        for step in range(count):
+            started = time.perf_counter()
+            simulation.advance(until=(step + 1) * 0.01)
+            simulation.sample()
+            middle = time.perf_counter()
             host.run(0.01)
             for name in names:
                 host[name]
-        coupled = min(coupled, time.perf_counter() - started)
-    print(f"plain {plain:.2f} s, as a unit {coupled:.2f} s, {coupled / plain - 1:+.1%}")
-    assert coupled < 1.05 * plain
+            ended = time.perf_counter()
+            plain[step], coupled[step] = min(plain[step], middle - started), min(coupled[step], ended - middle)
+    share = coupled.sum() / plain.sum() - 1
+    print(f"plain {plain.sum():.3f} s, as a unit {coupled.sum():.3f} s, {share:+.1%}")
+    assert share < 0.05
