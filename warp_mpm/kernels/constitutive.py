@@ -172,10 +172,11 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
                 )
                 excess = pressure - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
                 residual = points.pressure_residual[p]
-                whole = least_filling > F(0.6)
+                points.pressure_residual[p] = excess - smooth_excess
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
-                points.pressure_residual[p] = wp.where(whole, excess - smooth_excess, F(0.0))
-                if whole and strain < F(0.0):
+                surrounded = wp.where(least_filling > F(0.6), wp.int32(1), wp.int32(0))
+                points.surrounded[p] = surrounded
+                if surrounded == 1 and strain < F(0.0):
                     share = wp.min(parameters.relaxation_rate * time_step, F(1.0))
                     strain = wp.min(
                         strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)

@@ -138,6 +138,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["liquid_strain"] = array(dtype=scalar)
     if effects.pressure_relaxation:
         points["pressure_residual"] = array(dtype=scalar)
+        points["surrounded"] = array(dtype=wp.int32)  # 1: the corners around are filled, so that the filter acts
     if effects.bulk_viscosity:
         points["viscous_pressure"] = array(dtype=scalar)
     if effects.two_phase:

@@ -279,7 +279,8 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             excess = F(0.0)
             residual = F(0.0)
             if RELAXATION:
-                residual = points.pressure_residual[p]
+                if points.surrounded[p] == 1:
+                    residual = points.pressure_residual[p]
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
                 pressure = wp.max(
                     -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
