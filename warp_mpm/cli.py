@@ -1,4 +1,4 @@
-"""The command line: `python -m warp_mpm run | check | schema`.
+"""The command line: `python -m warp_mpm run | check | schema`, and the commands on runs in `warp_mpm/commands/`.
 
 Exit codes: 0 done, 2 the input cannot be used (one sentence says why), 3 the simulation diverged, 130 interrupted.
 """
@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
+
+from warp_mpm.commands import register
 
 if TYPE_CHECKING:
     from warp_mpm.scenario import Scenario
@@ -46,6 +48,7 @@ def run(
     until: Annotated[
         float | None, typer.Option(help="End time in seconds.", show_default="that of the scenario")
     ] = None,
+    report: Annotated[bool, typer.Option("--report", help="Write report.html into the folder at the end.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     resume: Annotated[
@@ -121,6 +124,11 @@ def run(
             f"is mended: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(BAD_INPUT) from None
+    if report:
+        from warp_mpm.report import write_report
+        from warp_mpm.results import Results
+
+        write_report([Results.open(folder)], folder / "report.html")
     display.summarize(outcome)
     if not outcome.finished:
         _complain(
@@ -156,6 +164,9 @@ def schema() -> None:
     from warp_mpm.scenario import json_schema
 
     typer.echo(json_schema())
+
+
+register(app)
 
 
 def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenario:

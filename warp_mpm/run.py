@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -263,6 +263,7 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         "started": _now(),
         "device": str(simulation.device),
         "material_points": simulation.material_points,
+        **({"effects": asdict(simulation.effects)} if hasattr(simulation, "effects") else {}),
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": used,
         **_commit(),

@@ -53,22 +53,21 @@ def _flow_measures(panel: Axes, scenario: Scenario, flow: np.ndarray, step: floa
     material, depth = scenario.flow.material, scenario.flow.depth
     front, tail = float(flow[:, 0].max()), float(flow[:, 0].min())
     middle = flow.mean(axis=0)
-    panel.text(
-        middle[0],
-        0.45 * depth + float(flow[:, 1].min()),
-        f"V = {scenario.flow.volume:g} m³/m, n = {material.porosity:g}, ρ = {material.density:,.0f} kg/m³",
-        ha="center",
-        va="center",
+    panel.set_title(
+        f"flow: V = {scenario.flow.volume:g} m³/m, n = {material.porosity:g}, ρ = {material.density:,.0f} kg/m³"
+        + ("" if scenario.barrier is None else f"; barrier: {scenario.barrier.motion.kind}"),
         fontsize=9,
+        loc="left",
     )
     speed = scenario.flow.speed
     if speed > 0.0:
-        along = np.array(scenario.flow.velocity_m_per_s) / speed * 2.5 * step
-        start = np.array([middle[0] - 0.5 * along[0], float(flow[:, 1].max()) + 0.9 * step])
-        panel.annotate("", start + along, start, arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})
-        panel.text(*(start + along + np.array([0.3 * step, 0.0])), f"{speed:g} m/s", fontsize=9, va="center")
+        along_x, along_y = (2.5 * step * component / speed for component in scenario.flow.velocity_m_per_s)
+        start = (float(middle[0]) - 0.5 * along_x, float(flow[:, 1].max()) + 0.9 * step)
+        end = (start[0] + along_x, start[1] + along_y)
+        panel.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})
+        panel.text(end[0] + 0.3 * step, end[1], f"{speed:g} m/s", fontsize=9, va="center")
     _measure(panel, (tail, -step), (front, -step), f"{front - tail:.3g} m")
-    deepest = float(flow[np.argmax(flow[:, 1]), 0])
+    deepest = float(flow[flow[:, 1] == flow[:, 1].max(), 0].mean())
     _measure(panel, (deepest, float(flow[:, 1].min())), (deepest, float(flow[:, 1].max())), f"h = {depth:g} m")
     if scenario.barrier is not None and front < -1e-9:
         _measure(panel, (front, -step), (0.0, -step), f"d = {-front:.3g} m")

@@ -1,0 +1,31 @@
+"""Commands on finished runs, and on many at once: report, plot, animate, sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import typer
+
+from warp_mpm.commands.animate import animate
+from warp_mpm.commands.plot import plot
+from warp_mpm.commands.report import report
+from warp_mpm.commands.sweep import sweep
+
+EXAMPLES: dict[Callable[..., None], str] = {
+    report: (
+        "Example: python -m warp_mpm report runs/set_iib; "
+        "two side by side: python -m warp_mpm report runs/case_1 runs/case_1_fixed --out comparison.html"
+    ),
+    plot: (
+        "Example: python -m warp_mpm plot field runs/case_1 runs/case_4 --times 1,2,4,6 --out fig_5.png; "
+        "a scenario before it runs: python -m warp_mpm plot scene scenarios/set_iib.json"
+    ),
+    animate: "Example: python -m warp_mpm animate runs/set_iib --out set_iib.mp4 --field pore_pressure --speed 0.5",
+    sweep: "Example: python -m warp_mpm sweep docs/sweeps/barrier_mass.json --out runs/barrier_mass --workers 2",
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command, example in EXAMPLES.items():
+        app.command(epilog=example)(command)

@@ -1,0 +1,42 @@
+"""`python -m warp_mpm report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from warp_mpm.commands.refusals import refusals, times_of
+
+
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders.", show_default=False)],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The page.",
+            show_default="report.html in the run folder; of several, comparison.html here",
+        ),
+    ] = None,
+    times: Annotated[str, typer.Option(help="Times of the still pictures [s], with commas between.")] = "1,2,4",
+) -> None:
+    """Write one HTML page that tells and shows all of a run, or of several side by side.
+
+    The page needs no network and no other file: the flow to play and to point at, forces, motion and energies with the
+    closed form over them, still pictures, key figures, ledger, effects, settings, versions and warnings.
+    """
+    with refusals():
+        from warp_mpm.recording.run_folder import REPORT
+        from warp_mpm.results import Results
+
+        wanted = times_of(times)
+        target = out if out is not None else (runs[0] / REPORT if len(runs) == 1 else Path("comparison.html"))
+        results = [Results.open(run) for run in runs]
+        if target.is_dir() or not target.parent.is_dir():
+            raise ValueError(f"--out {target} must be a file in a folder that exists.")
+        from warp_mpm.report import write_report
+
+        write_report(results, target, times=wanted)
+        typer.echo(f"{target} ({target.stat().st_size / 1e6:.1f} MB)")

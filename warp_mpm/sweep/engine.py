@@ -1,0 +1,223 @@
+"""Runs the cases of a sweep on Dask, here or on a cluster, and gathers their key figures in one table."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from warp_mpm.recording import run_folder
+from warp_mpm.recording.run_folder import RunFolder
+from warp_mpm.results import Results, ResultsError
+from warp_mpm.run import run_scenario
+from warp_mpm.scenario import Scenario
+from warp_mpm.sweep.design import Case, Sweep, SweepError
+
+SWEEP, CASES, TABLE = "sweep.json", "cases", "results.parquet"
+"""What the folder of a sweep holds: the resolved sweep, a run folder for each case, the table."""
+
+ALLOWED_FAILURES = 5
+"""How many workers may die under one case before it counts as failed: a case that kills them must not go on."""
+
+Row = dict[str, Any]
+
+
+def run_sweep(
+    sweep: Sweep,
+    base: Scenario,
+    out: Path,
+    *,
+    workers: int = 2,
+    scheduler: str | None = None,
+    device: str = "cpu",
+    retry_failed: bool = False,
+    on_start: Callable[[int, int, str], None] = lambda total, done, dashboard: None,
+    on_case: Callable[[Row], None] = lambda row: None,
+    make_simulation: Callable[[Scenario], Any] | None = None,
+) -> list[Row]:
+    """Run all cases that have not been run, and write the table of all.
+
+    A case that fails is a row of the table and does not stop the others; a worker that dies has its case run again by
+    another. Called again with the same folder, only what is missing is run.
+
+    Args:
+        sweep: what varies.
+        base: the scenario that it varies.
+        out: folder of the sweep; made if need be.
+        workers: processes on this machine, one case at a time each.
+        scheduler: address of a Dask scheduler that has workers; None starts `workers` of them here.
+        device: of the simulations.
+        retry_failed: cases that failed before are run again.
+        on_start: called with the number of cases, of those done before, and the address of the dashboard or "".
+        on_case: called with the row of each case as it ends.
+        make_simulation: stands in for the simulation, in tests.
+
+    Returns:
+        Rows in the order of the cases: `case`, `status`, `problem`, the varied fields, the key figures (SI).
+
+    Raises:
+        SweepError: a case is impossible, or the folder holds another sweep; nothing was run.
+    """
+    cases = sweep.cases(base)
+    _claim(out, {**sweep.model_dump(mode="json"), "scenario": base.resolved()})
+    done = {case.number: row for case in cases if (row := _row_of(case, out, retry_failed)) is not None}
+    waiting = [case for case in cases if case.number not in done]
+    with _client(workers, scheduler) as client:
+        on_start(len(cases), len(done), getattr(client, "dashboard_link", "") or "")
+        from distributed import as_completed
+
+        futures = {
+            client.submit(
+                run_case,
+                case.scenario.resolved(),
+                str(_folder(case, out).resolve()),
+                device,
+                make_simulation,
+                key=f"case-{case.name}-{id(client)}",
+                pure=False,
+            ): case
+            for case in waiting
+        }
+        try:
+            for future in as_completed(futures):
+                case = futures[future]
+                problem = future.result() if future.status == "finished" else _problem(future)
+                row = _row_of(case, out, retry_failed=False) or _row(case, "failed", problem, {})
+                done[case.number] = row
+                on_case(row)
+        finally:
+            for future in futures:
+                with contextlib.suppress(Exception):  # the scheduler may be gone
+                    future.cancel()
+            rows = [done[number] for number in sorted(done)]
+            write_table(rows, out / TABLE)
+    return rows
+
+
+def run_case(
+    scenario: dict[str, Any],
+    folder: str,
+    device: str = "cpu",
+    make_simulation: Callable[[Scenario], Any] | None = None,
+) -> str | None:
+    """Run one case into its folder, in a worker; returns what went wrong, or None.
+
+    What an earlier worker left there, which died, is replaced.
+    """
+    path = Path(folder)
+
+    def simulation(scene: Scenario) -> Any:
+        from warp_mpm.simulation import Simulation
+
+        return Simulation(scene, device=device)
+
+    try:
+        outcome = run_scenario(
+            Scenario.model_validate(scenario), path, make_simulation=make_simulation or simulation, force=path.exists()
+        )
+    except Exception as error:  # whatever it is, it is this case's alone
+        return f"{type(error).__name__}: {error}"
+    return None if outcome.finished else "stopped before its end"
+
+
+def write_table(rows: list[Row], target: Path) -> None:
+    """Write the table as Parquet, whole or not at all; a group of figures is left to the cases' own folders."""
+    import pandas as pd
+
+    aside = target.with_name(target.name + run_folder.ASIDE)
+    frame = pd.DataFrame(rows)
+    for name in frame.columns:
+        # A column of lists or mixed values has no one type, but its text has.
+        if frame[name].dtype == object and not all(isinstance(value, str | None) for value in frame[name]):
+            kinds = {type(value) for value in frame[name] if value is not None}
+            if not kinds <= {bool} and not kinds <= {int, float}:
+                frame[name] = [None if value is None else json.dumps(value) for value in frame[name]]
+    frame.to_parquet(aside, index=False)
+    aside.replace(target)
+
+
+def _claim(out: Path, content: dict[str, Any]) -> None:
+    """Make the folder this sweep's, or see that it is.
+
+    Raises:
+        SweepError: it is another's.
+    """
+    if (out / SWEEP).exists():
+        try:
+            before = json.loads((out / SWEEP).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise SweepError(f"{out / SWEEP} cannot be read; choose another folder with --out.") from None
+        if before != json.loads(json.dumps(content)):
+            raise SweepError(f"{out} holds another sweep, or this one before it was changed; choose another folder.")
+        return
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise SweepError(f"{out} holds something that is no sweep; choose another folder with --out.")
+    (out / CASES).mkdir(parents=True, exist_ok=True)
+    RunFolder(out).write(SWEEP, content)
+
+
+def _folder(case: Case, out: Path) -> Path:
+    return out / CASES / case.name
+
+
+def _row_of(case: Case, out: Path, retry_failed: bool) -> Row | None:
+    """The row of a case that has been run; None where it is still to be run."""
+    try:
+        results = Results.open(_folder(case, out))
+        status = results.record.get("status")
+        if status == "finished":
+            return _row(case, status, None, results.summary)
+        if status == "failed" and not retry_failed:
+            return _row(case, status, results.record.get("problem"), {})
+    except ResultsError:
+        pass
+    return None
+
+
+def _row(case: Case, status: str, problem: str | None, summary: dict[str, Any]) -> Row:
+    figures = {name: value for name, value in summary.items() if not isinstance(value, dict)}
+    for name in ("title", "status"):
+        figures.pop(name, None)
+    return {"case": case.number, "status": status, "problem": problem, **case.values, **figures}
+
+
+def _problem(future: Any) -> str:
+    try:
+        error = future.exception(timeout=5)
+    except Exception as unknown:
+        error = unknown
+    return f"{type(error).__name__}: {error}"
+
+
+@contextmanager
+def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
+    """A connection to a scheduler that has workers.
+
+    Raises:
+        SweepError: Dask is not installed, or the scheduler does not answer.
+    """
+    try:
+        import dask
+        import distributed
+        import pandas  # noqa: F401 - asked for before hours of runs, not after
+    except ImportError:
+        raise SweepError("sweep needs Dask, pandas and pyarrow: pip install 'warp-mpm-impact[sweep]'") from None
+    with dask.config.set({"distributed.scheduler.allowed-failures": ALLOWED_FAILURES}):
+        if scheduler is not None:
+            try:
+                client = distributed.Client(scheduler, timeout="10s")
+            except (OSError, ValueError) as error:
+                raise SweepError(f"--scheduler {scheduler} does not answer: {error}.") from None
+            with client:
+                yield client
+            return
+        with (
+            distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
