@@ -17,6 +17,7 @@ from .grid import contact_nodes, fit_grid, open_corner_volumes
 from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.mohr_coulomb import yield_constants
+from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import STANDARD_GRAVITY, DryFlow, Fixed, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
 from .time_step import step_limits
 
@@ -462,8 +463,10 @@ class Simulation:
             "solid_mass": self._initial.solid_mass[inside],
             "liquid_mass": self._initial.liquid_mass[inside],
         }
-        expansion = arrays["volume"] / arrays["reference_volume"]
-        state["porosity"] = 1.0 - (1.0 - material.porosity) / expansion
+        state["porosity"] = np.full(len(arrays["volume"]), material.porosity)
+        if self.effects.porosity_update:
+            grains = (1.0 - material.porosity) * arrays["reference_volume"]
+            state["porosity"] = np.maximum(1.0 - grains / arrays["volume"], LEAST_POROSITY)
         if self.effects.two_phase:
             state["liquid_velocity"] = arrays["velocity"][:, 2:]
         if self.effects.liquid:

@@ -14,6 +14,7 @@ from .contact import make_contact
 from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
+from .pore_pressure import make_pore_pressure
 from .rigid_barrier import make_rigid_barrier
 from .shape_functions import make_shape_functions
 from .transfer import make_transfer
@@ -33,9 +34,10 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     wp.set_module_options(options, module=wp.get_module(module))
     types = layout(effects)
     shapes = make_shape_functions(types)
-    transfer = make_transfer(types, shapes, module)
+    pore = make_pore_pressure(types)
+    transfer = make_transfer(types, shapes, pore, module)
     momentum = make_grid_momentum(types, module)
-    constitutive = make_constitutive(types, shapes, module)
+    constitutive = make_constitutive(types, shapes, pore, module)
     clock = make_clock(types, module)
     kernels = SimpleNamespace(
         types=types,
@@ -44,7 +46,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         **constitutive.__dict__,
         start=clock.start,
         tick=clock.tick,
-        ledger=make_ledger(types, module).ledger,
+        ledger=make_ledger(types, pore, module).ledger,
     )
     if effects.ground != "none" or effects.side_walls or effects.ceiling or effects.barrier != "none":
         contact = make_contact(types, momentum, module)

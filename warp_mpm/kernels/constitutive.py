@@ -20,7 +20,9 @@ from .layout import (
 from .mohr_coulomb import make_return_mapping
 
 
-def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_constitutive(
+    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
+) -> SimpleNamespace:
     """Build the kernels `update` and, if called for, `plasticity` (over points)."""
     effects = types.effects
     F = types.scalar
@@ -31,6 +33,8 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
     Grid = types.Grid
     Parameters = types.Parameters
     hats = shapes.hats
+    pressure_at = pore.pressure
+    porosity = pore.porosity
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -136,7 +140,7 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             # Artificial, linear (Landshoff), on compression only: keeps a front of sound from ringing.
             mixture = divergence
             if TWO_PHASE:
-                n = parameters.porosity
+                n = porosity(points.reference_volume[p], points.volume[p], parameters)
                 mixture = (F(1.0) - n) * divergence + n * liquid_divergence
             points.viscous_pressure[p] = -parameters.bulk_viscosity * wp.min(mixture, F(0.0))
 
@@ -160,17 +164,14 @@ def make_constitutive(types: SimpleNamespace, shapes: SimpleNamespace, module: s
             # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
             strain = points.liquid_strain[p]
             if TWO_PHASE:
-                n = parameters.porosity
+                n = porosity(points.reference_volume[p], points.volume[p], parameters)
                 strain += time_step * ((F(1.0) - n) * divergence + n * liquid_divergence) / n
             else:
                 strain += volume_strain / parameters.porosity
             if RELAXATION:
                 # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
                 # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
-                pressure = wp.max(
-                    -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
-                )
-                excess = pressure - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
                 residual = points.pressure_residual[p]
                 points.pressure_residual[p] = excess - smooth_excess
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.

@@ -17,6 +17,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
+    POROSITY = effects.porosity_update
     FLIP = effects.transfer == "flip"
 
     @wp.func
@@ -38,14 +39,15 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         return result
 
     @wp.func
-    def dragged(free: V, parameters: Parameters, time_step: F) -> V:
+    def dragged(free: V, coefficient: F, parameters: Parameters, time_step: F) -> V:
         """Exchange momentum between the phases, after their own forces. Per node and direction the two unknowns
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
-        Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt."""
+        Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
+        `coefficient` is Q over its value at the initial porosity."""
         total = parameters.solid_density + parameters.liquid_density
         solid_share = parameters.solid_density / total
         liquid_share = parameters.liquid_density / total
-        lost = parameters.drag_rate * time_step
+        lost = coefficient * parameters.drag_rate * time_step
         if IMPLICIT_DRAG:
             lost = lost / (F(1.0) + lost)
         x = lost * (free[2] - free[0])
@@ -68,7 +70,10 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 if mass > F(0.0):
                     new = free_velocity(grid, parameters, i, j, time_step)
                     if TWO_PHASE:
-                        new = dragged(new, parameters, time_step)
+                        coefficient = F(1.0)
+                        if POROSITY:
+                            coefficient = grid.drag[i, j] / mass
+                        new = dragged(new, coefficient, parameters, time_step)
                     grid.velocity[i, j] = new
                     if FLIP:
                         grid.increment[i, j] = new - grid.momentum[i, j] / mass

@@ -155,6 +155,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.transfer == "flip":
         grid["force"] = array(dtype=V, ndim=2)
         grid["increment"] = array(dtype=V, ndim=2)
+    if effects.porosity_update:
+        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient times volume
     if effects.effective_contact_force:
         grid["liquid_surplus"] = array(dtype=V2, ndim=2)  # momentum that the liquid alone would have gained beyond
     if effects.smoothing_grid:

@@ -20,11 +20,13 @@ from .layout import (
 )
 
 
-def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build the kernel `ledger` (over points), which adds to an array emptied before."""
     effects = types.effects
     F = types.scalar
     Points = types.Points
+    pressure_at = pore.pressure
+    porosity = pore.porosity
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -67,12 +69,9 @@ def make_ledger(types: SimpleNamespace, module: str) -> SimpleNamespace:
         if LIQUID:
             # Taken before the pressure's own maximum, which passes over what is no number.
             sound = sound and wp.isfinite(points.liquid_strain[p])
-            pressure = wp.max(
-                -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
-            )
-            elastic += (
-                F(0.5) * volume * parameters.porosity * pressure * pressure / parameters.liquid_bulk_modulus
-            )
+            pressure = pressure_at(points.liquid_strain[p], parameters)
+            n = porosity(reference, volume, parameters)
+            elastic += F(0.5) * volume * n * pressure * pressure / parameters.liquid_bulk_modulus
             wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), wp.float64(pressure))
             upstream = wp.bool(True)
             if BARRIER:

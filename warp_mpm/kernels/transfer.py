@@ -12,7 +12,9 @@ from .layout import (
 )
 
 
-def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_transfer(
+    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
+) -> SimpleNamespace:
     """Build the kernels `clear` (workers on the blocks in use), `forget`, `scatter` and `gather` (over points)."""
     effects = types.effects
     F = types.scalar
@@ -37,6 +39,9 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
+    POROSITY = effects.porosity_update
+    pressure_at = pore.pressure
+    porosity = pore.porosity
 
     @wp.kernel(module=module)
     def clear(grid: Grid, parameters: Parameters):
@@ -57,6 +62,8 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                     grid.force[i, j] = V()
                 if PORE_FORCE:
                     grid.liquid_surplus[i, j] = V2()
+                if POROSITY:
+                    grid.drag[i, j] = F(0.0)
                 if CORNERS:
                     grid.corner[i, j] = S()
 
@@ -116,15 +123,13 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
 
         pressure = F(0.0)
         if LIQUID:
-            pressure = wp.max(
-                -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
-            )
+            pressure = pressure_at(points.liquid_strain[p], parameters)
         if VISCOSITY:
             pressure += points.viscous_pressure[p]
         solid_pressure = pressure
         liquid_force = F(0.0)
         if TWO_PHASE:
-            n = parameters.porosity
+            n = porosity(reference, volume, parameters)
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
         push = volume
@@ -174,6 +179,10 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
             for m in range(3):
                 j = cj + (m - 1)
                 grid.mass[i, j] += wy[m] * column_mass
+                if POROSITY:
+                    # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
+                    ratio = n / parameters.porosity
+                    grid.drag[i, j] += wy[m] * column_mass * ratio * ratio
                 if APIC:
                     grid.momentum[i, j] += (
                         wy[m] * column_velocity + (wy[m] * to_y[m]) * column_affine + dy[m] * column_slope
@@ -282,10 +291,7 @@ def make_transfer(types: SimpleNamespace, shapes: SimpleNamespace, module: str) 
                 if points.surrounded[p] == 1:
                     residual = points.pressure_residual[p]
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
-                pressure = wp.max(
-                    -parameters.liquid_bulk_modulus * points.liquid_strain[p], -parameters.cavitation_pressure
-                )
-                excess = pressure - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
             for k in range(2):
                 for m in range(2):
                     h = hx[k] * hy[m] * reference
