@@ -94,8 +94,10 @@ def shown(results: Results, frame: Snapshot, field: Field) -> np.ndarray:
 
 
 def window(scenario: Scenario, frames: Sequence[Snapshot]) -> Window:
-    """Limits [m] that hold the material and the barrier in all frames."""
-    points = np.concatenate([frame.position for frame in frames])
+    """Limits [m] that hold the barrier and 97 % of the material in every frame: the thread of a jet that has run far
+    ahead would leave the rest too small to see."""
+    spans = [np.quantile(frame.position, (0.005, 0.97), axis=0) for frame in frames if len(frame.position)]
+    points = np.concatenate([*spans, np.zeros((1, 2))])
     if scenario.barrier is not None and isinstance(scenario.barrier.shape, Trapezoid):
         outlines = [_moved(scenario.barrier.shape, frame.barrier_displacement or 0.0) for frame in frames]
         points = np.concatenate([points, *outlines])
