@@ -3,13 +3,14 @@
 The paper takes lambda for a constant, 0.72 fixed and 0.41 sliding, and leaves the vertical load out. A sweep of
 simulations (``analytic.sweep``) says instead
 
-    lambda = (3/4) (m2/m1)^c / (a (1 - cos beta) + b / Fr)             (without m2/m1 where the barrier is fixed)
-    T1 v / h = t (L/h)^p (1 - cos beta)^q,       tau = T1 / T2
-    kappa = cot(beta)
+    F_peak = (a (1 - cos beta) + b / Fr^2) M^c rho h v^2,     M = m2 / (m1 + m2), 1 where the barrier is fixed
+    T1     = t (L/h)^p (1 - cos beta)^q h / v
+    kappa  = cot(beta)
 
-in the variant ``momentum_closed``. The denominator is F_peak / (rho h v^2): a jet that the face turns by beta, and the
-weight of the flow. A smooth face passes on its normal force alone, hence kappa. ``docs/closed_form.md`` tells how well
-this does on scenes that were not fitted. Standard library only.
+The bracket is a jet that the face turns by beta, and the weight of the flow; a smooth face passes on its normal force
+alone, hence kappa. With the impulse J of the variant ``momentum_closed``, lambda and tau follow: T2 = 2 J / F_peak,
+lambda = 3 v T2 / (8 L), tau = T1 / T2. ``docs/closed_form.md`` tells how well this does on scenes that were not fitted.
+Standard library only.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class Constants:
     weight: float
     """b."""
     mass_exponent: float
-    """c; 0 where the barrier is fixed."""
+    """c; of no effect where the barrier is fixed."""
     rise: float
     """t."""
     rise_length_exponent: float
@@ -67,10 +68,10 @@ class Constants:
 
 CONSTANTS = {
     "sliding": Constants(
-        jet=1.368, weight=0.565, mass_exponent=0.174, rise=0.303, rise_length_exponent=0.559, rise_angle_exponent=-0.945
+        jet=1.277, weight=1.093, mass_exponent=0.289, rise=0.303, rise_length_exponent=0.559, rise_angle_exponent=-0.945
     ),
     "fixed": Constants(
-        jet=0.991, weight=0.865, mass_exponent=0.000, rise=0.289, rise_length_exponent=0.559, rise_angle_exponent=-1.161
+        jet=1.223, weight=0.889, mass_exponent=0.000, rise=0.289, rise_length_exponent=0.559, rise_angle_exponent=-1.161
     ),
 }
 """Fitted by ``python -m analytic sweep fit docs/data/sweep.csv``."""
@@ -103,21 +104,42 @@ def coefficients(scene: Scene, constants: Constants | None = None) -> Coefficien
     at = constants or CONSTANTS["fixed" if scene.fixed else "sliding"]
     beta = math.radians(scene.face_angle)
     turned = 1 - math.cos(beta)
-    mass_ratio = 1.0 if scene.barrier_mass is None else scene.barrier_mass / scene.flow_mass
-    denominator = at.jet * turned + at.weight / scene.froude_number
-    geometry_change = min(0.75 * mass_ratio**at.mass_exponent / denominator, 1.0)
+    mass_share = 1.0 if scene.barrier_mass is None else scene.barrier_mass / (scene.flow_mass + scene.barrier_mass)
+    peak_force = (at.jet * turned + at.weight / scene.froude_number**2) * mass_share**at.mass_exponent
+    peak_force *= scene.density * scene.flow_height * scene.speed**2
     length_ratio = scene.flow_length / scene.flow_height
     rise_time = at.rise * length_ratio**at.rise_length_exponent * turned**at.rise_angle_exponent
-    # T2 v / h = (8/3) lambda L / h, Eq. (8).
-    rise_ratio = min(rise_time / (8 / 3 * geometry_change * length_ratio), 1.0)
+    rise_time *= scene.flow_height / scene.speed
     kappa = 0.0
     if not scene.fixed:
         kappa = 1 / math.tan(beta) if scene.face_angle < 90 else 0.0
         if scene.base_friction:
             kappa = min(kappa, GREATEST_FRICTION_SHARE / scene.base_friction)
+    duration = 2 * _impulse(scene, peak_force, rise_time, kappa) / peak_force
+    geometry_change = min(3 * scene.speed * duration / (8 * scene.flow_length), 1.0)
+    rise_ratio = min(rise_time * 3 * scene.speed / (8 * geometry_change * scene.flow_length), 1.0)
     return Coefficients(
         geometry_change=geometry_change, rise_ratio=rise_ratio, vertical_load_ratio=kappa, variant=BASE_VARIANT
     )
+
+
+def _impulse(scene: Scene, peak_force: float, rise_time: float, kappa: float) -> float:
+    """Impulse [N s/m] of ``momentum_closed`` for a given peak force and rise time, instead of a given duration.
+
+    With T2 = 2 J / F and tau T2 = T1 its equation is linear: J (1/mu - 2 G/F) = v - G R T1 / (2 F), where
+    G = g tan(delta_b), R is the threshold force, and mu the reduced mass of the flow and the driven mass.
+    """
+    stopping = scene.flow_mass * scene.speed
+    if scene.barrier_mass is None or not scene.base_friction:
+        return stopping if scene.barrier_mass is None else stopping / (1 + scene.flow_mass / scene.barrier_mass)
+    driven_mass = scene.barrier_mass / (1 - kappa * scene.base_friction)
+    deceleration = scene.gravity * scene.base_friction
+    threshold = driven_mass * deceleration
+    inverse_mass = 1 / scene.flow_mass + 1 / driven_mass - 2 * deceleration / peak_force
+    momentum = scene.speed - deceleration * threshold * rise_time / (2 * peak_force)
+    if peak_force <= threshold or momentum >= inverse_mass * stopping:
+        return stopping  # the barrier has stopped by T2, or has not moved at all
+    return momentum / inverse_mass
 
 
 def calibrated_impact(scene: Scene, **model: Any) -> Impact:

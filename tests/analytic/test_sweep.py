@@ -68,13 +68,27 @@ def test_a_plan_can_be_repeated() -> None:
 # --- the fitted rule -------------------------------------------------------------------------------------------------
 
 
-def test_peak_force_of_a_fixed_barrier_is_a_turned_jet_and_a_weight() -> None:
-    scene = Scene(flow_mass=81000.0, flow_length=15.0, flow_height=3.0, speed=10.0, face_angle=60.0)
-    impact = calibrated_impact(scene)
-    at = CONSTANTS["fixed"]
-    expected = at.jet * 0.5 + at.weight / scene.froude_number
-    assert impact.peak_force / (1800 * 3 * 10**2) == pytest.approx(expected)
-    assert impact.vertical_load_ratio == 0
+@pytest.mark.parametrize("barrier_mass", [None, 60000.0, 160000.0])
+@pytest.mark.parametrize("rise_share", [0.1, 1.0])
+def test_peak_force_and_its_time_are_those_of_the_formulas(barrier_mass: float | None, rise_share: float) -> None:
+    """lambda and tau are chosen through the impulse of momentum_closed, which Impact finds on its own."""
+    scene = Scene(
+        flow_mass=81000.0,
+        flow_length=15.0,
+        flow_height=3.0,
+        speed=10.0,
+        face_angle=70.0,
+        barrier_mass=barrier_mass,
+        base_friction=None if barrier_mass is None else 0.3,
+    )
+    at = replace(CONSTANTS["fixed" if scene.fixed else "sliding"], rise=rise_share * 0.3)
+    impact = calibrated_impact(scene, **coefficients(scene, at).model)
+    turned, share = 1 - math.cos(math.radians(70)), 1.0 if barrier_mass is None else 1 / (1 + 81000 / barrier_mass)
+    pressure = (at.jet * turned + at.weight / scene.froude_number**2) * share**at.mass_exponent
+    assert impact.peak_force / (1800 * 3 * 10**2) == pytest.approx(pressure, rel=1e-9)
+    rise = at.rise * 5**at.rise_length_exponent * turned**at.rise_angle_exponent
+    assert impact.peak_time * 10 / 3 == pytest.approx(rise, rel=1e-9)
+    assert impact.vertical_load_ratio == (0 if barrier_mass is None else pytest.approx(1 / math.tan(math.radians(70))))
 
 
 def test_a_vertical_face_bears_no_vertical_load_and_a_flat_one_keeps_below_locking() -> None:
@@ -143,8 +157,8 @@ MADE_UP = [made_up(name, content) for name, content in PLAN.items()]
 
 @pytest.mark.parametrize(("fixed", "constants"), [(True, FIXED), (False, SLIDING)], ids=["fixed", "sliding"])
 def test_the_fit_finds_the_constants_that_made_the_table(fixed: bool, constants: Constants) -> None:
-    # tau is cut off at 1 for short flows on flat faces; those rows do not tell T1's constants.
-    runs = [run for run in sweep_fit.usable(MADE_UP, fixed) if coefficients(run.scene, constants).rise_ratio < 1]
+    # lambda and tau are cut off at 1 in some scenes, whose peak forces and times do not tell the constants.
+    runs = [run for run in sweep_fit.usable(MADE_UP, fixed) if _inside(coefficients(run.scene, constants))]
     found = sweep_fit.fit(runs)
     for name, value in vars(constants).items():
         assert getattr(found, name) == pytest.approx(value, rel=1e-3), name
@@ -156,6 +170,10 @@ def test_the_fit_finds_the_constants_that_made_the_table(fixed: bool, constants:
         assert held_out.within_two == 1
         assert held_out.displacement_factor == pytest.approx(1, abs=1e-2)
         assert paper.displacement_factor > 1.5
+
+
+def _inside(numbers: fitted.Coefficients) -> bool:
+    return numbers.geometry_change < 1 and numbers.rise_ratio < 1
 
 
 def test_cross_validation_predicts_no_run_with_constants_it_was_fitted_to(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,7 +248,7 @@ def test_the_calibrated_variant_gains_on_scenes_it_was_not_fitted_to() -> None:
     sliding = sweep_fit.usable(runs, fixed=False)
     before = sweep_fit.score(sliding, [sweep_fit.paper_rule(run.scene) for run in sliding])
     after = sweep_fit.score(sliding, sweep_fit.cross_validated(sliding))
-    assert after.peak_force_median < 0.6 * before.peak_force_median
+    assert after.peak_force_median < 0.4 * before.peak_force_median
     assert math.log(after.displacement_factor) < 0.6 * math.log(before.displacement_factor)
     assert after.within_two > before.within_two + 0.2
     fixed = sweep_fit.usable(runs, fixed=True)
