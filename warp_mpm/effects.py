@@ -72,7 +72,7 @@ class Effects:
     @property
     def module_name(self) -> str:
         """Name of the Warp module: one per set of effects."""
-        flags = [self.formulation, self.precision, self.transfer, self.drag, self.barrier, self.ground]
+        flags: list[str] = [self.formulation, self.precision, self.transfer, self.drag, self.barrier, self.ground]
         flags += [
             name
             for name in (

@@ -37,8 +37,8 @@ class GridLayout:
 
     def node_positions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """x of the columns [columns] and y of the rows [rows] of nodes at t = 0 [m]."""
-        x = self.left + (np.arange(self.columns) + 0.5) * self.spacing
-        y = self.bottom + (np.arange(self.rows) + 0.5) * self.spacing
+        x = self.left + (np.arange(self.columns, dtype=np.float64) + 0.5) * self.spacing
+        y = self.bottom + (np.arange(self.rows, dtype=np.float64) + 0.5) * self.spacing
         return x, y
 
 

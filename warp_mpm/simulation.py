@@ -18,13 +18,13 @@ from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.mohr_coulomb import yield_constants
 from .kernels.pore_pressure import LEAST_POROSITY
-from .scenario import STANDARD_GRAVITY, DryFlow, Fixed, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
+from .scenario import STANDARD_GRAVITY, DryFlow, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
 from .time_step import step_limits
 
 wp.config.log_level = wp.LOG_WARNING
 
 
-class SimulationDiverged(RuntimeError):
+class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
     """The run left the range of sense; the message says when and what to try."""
 
 
@@ -35,10 +35,7 @@ def derive_effects(scenario: Scenario) -> Effects:
     if barrier is not None:
         motion = {"fixed": "fixed", "sliding": "sliding", "prescribed": "driven"}[barrier.motion.kind]
     liquid = not isinstance(flow, DryFlow)
-    if ground is None:
-        surface = "none"
-    else:
-        surface = "frictional" if ground.friction > 0.0 else "smooth"
+    surface = "none" if ground is None else "frictional" if ground.friction > 0.0 else "smooth"
     return Effects(
         formulation=flow.formulation,
         precision=numerics.precision,
@@ -285,7 +282,11 @@ class Simulation:
 
     def _step(self) -> None:
         effects, grid, points, parameters, clock = (
-            self.effects, self._grid, self._points, self._parameters, self._clock,
+            self.effects,
+            self._grid,
+            self._points,
+            self._parameters,
+            self._clock,
         )
         count = self.material_points
         self._launch("clear", self._workers, grid, parameters)
@@ -310,7 +311,15 @@ class Simulation:
         if effects.plasticity:
             self._launch("plasticity", count, points, parameters)
         self._launch(
-            "tick", 1, parameters, clock, self._counters, self._running, self._reactions, self._left, self._times,
+            "tick",
+            1,
+            parameters,
+            clock,
+            self._counters,
+            self._running,
+            self._reactions,
+            self._left,
+            self._times,
             self._velocities,
         )
 
@@ -451,7 +460,9 @@ class Simulation:
         """
         inside = self._point_arrays["inside"].numpy() > 0
         arrays = {
-            name: array.numpy()[inside].astype(np.float64) for name, array in self._point_arrays.items() if name != "inside"
+            name: array.numpy()[inside].astype(np.float64)
+            for name, array in self._point_arrays.items()
+            if name != "inside"
         }
         material = self.scenario.flow.material
         state = {
@@ -581,8 +592,12 @@ class Simulation:
         arrays = {f"points.{name}": array for name, array in self._point_arrays.items()}
         # Corner sums and the rest of the grid are rebuilt every step; only the blocks in use are remembered.
         arrays |= {
-            "clock": self._clock, "counters": self._counters, "reactions": self._reactions, "left": self._left,
-            "times": self._times, "velocities": self._velocities,
+            "clock": self._clock,
+            "counters": self._counters,
+            "reactions": self._reactions,
+            "left": self._left,
+            "times": self._times,
+            "velocities": self._velocities,
         }
         return arrays
 

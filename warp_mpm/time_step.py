@@ -45,9 +45,7 @@ def biot_wave_speeds(
     """
     n, solid = porosity, 1.0 - porosity
     coupling = solid * liquid_bulk_modulus
-    stiffness = np.array(
-        [[oedometric_modulus + solid * coupling / n, coupling], [coupling, n * liquid_bulk_modulus]]
-    )
+    stiffness = np.array([[oedometric_modulus + solid * coupling / n, coupling], [coupling, n * liquid_bulk_modulus]])
     mass = np.diag([solid * solid_density, n * liquid_density])
     slow, fast = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real))
     return float(fast), float(slow)

@@ -19,11 +19,10 @@ from .rigid_barrier import make_rigid_barrier
 from .shape_functions import make_shape_functions
 from .transfer import make_transfer
 
-
 CPU_COMPILER_FLAGS = (
     "-march=native -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000 -ffp-contract=fast"
 )
-"""Warp's own flags without its bound on the depth of vectorisation, and with fused multiply-add: docs/performance.md."""
+"""Warp's own flags without its bound on the depth of vectorisation, and with fused multiply-add."""
 
 
 @cache

@@ -37,7 +37,7 @@ from .layout import (
 
 
 def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernels `start` (before the first step of an interval) and `tick` (after each step), one thread each."""
+    """Build the kernels `start` (before an interval's first step) and `tick` (after each step), one thread each."""
     effects = types.effects
     Parameters = types.Parameters
     BARRIER = effects.barrier != "none"
@@ -117,9 +117,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         clock[wp.static(GRAVITY_IMPULSE_X)] = clock[wp.static(GRAVITY_IMPULSE_X)] + gx * weight
         clock[wp.static(GRAVITY_IMPULSE_Y)] = clock[wp.static(GRAVITY_IMPULSE_Y)] + gy * weight
         if BARRIER:
-            total = (
-                reactions[wp.static(2 * FACE)] + reactions[wp.static(2 * TOP)] + reactions[wp.static(2 * BACK)]
-            )
+            total = reactions[wp.static(2 * FACE)] + reactions[wp.static(2 * TOP)] + reactions[wp.static(2 * BACK)]
             if MOVING:
                 new = clock[wp.static(BARRIER_VELOCITY)]
                 middle = wp.float64(0.5) * (new + clock[wp.static(OLD_BARRIER_VELOCITY)])
@@ -130,9 +128,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
             clock[wp.static(BARRIER_IMPULSE_X)] = total
         # Points that left this step felt gravity in it: they are taken off afterwards.
         clock[wp.static(ACTIVE_MASS_SOLID)] = clock[wp.static(INITIAL_MASS_SOLID)] - left[wp.static(LEFT_SOLID_MASS)]
-        clock[wp.static(ACTIVE_MASS_LIQUID)] = (
-            clock[wp.static(INITIAL_MASS_LIQUID)] - left[wp.static(LEFT_LIQUID_MASS)]
-        )
+        clock[wp.static(ACTIVE_MASS_LIQUID)] = clock[wp.static(INITIAL_MASS_LIQUID)] - left[wp.static(LEFT_LIQUID_MASS)]
         counters[wp.static(STEPS)] = counters[wp.static(STEPS)] + 1
         clock[wp.static(LARGEST_TIME_STEP)] = wp.max(clock[wp.static(LARGEST_TIME_STEP)], dt)
         clock[wp.static(SMALLEST_TIME_STEP)] = wp.min(clock[wp.static(SMALLEST_TIME_STEP)], dt)

@@ -171,7 +171,9 @@ def make_constitutive(
             if RELAXATION:
                 # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
                 # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
-                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(
+                    parameters.gravity, x
+                )
                 residual = points.pressure_residual[p]
                 points.pressure_residual[p] = excess - smooth_excess
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
@@ -203,10 +205,7 @@ def make_constitutive(
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         margin = F(2.0)
         within = (
-            sx >= margin
-            and sx < F(parameters.columns) - margin
-            and sy >= margin
-            and sy < F(parameters.rows) - margin
+            sx >= margin and sx < F(parameters.columns) - margin and sy >= margin and sy < F(parameters.rows) - margin
         )
         if not within:
             # A position that is no number compares false above; such a point has not left, the run has diverged.

@@ -53,14 +53,18 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             free = free_velocity(grid, parameters, i, j, time_step)
             result = V2(free[2], free[3])
         elif PORE_FORCE:
-            result = (
-                free_velocity(grid, parameters, i, j, time_step) + grid.liquid_surplus[i, j] / grid.mass[i, j]
-            )
+            result = free_velocity(grid, parameters, i, j, time_step) + grid.liquid_surplus[i, j] / grid.mass[i, j]
         return result
 
     @wp.func
     def respond(
-        mass: F, velocity: V, liquid_free: V2, normal: V2, friction: F, surface_velocity: V2, parameters: Parameters,
+        mass: F,
+        velocity: V,
+        liquid_free: V2,
+        normal: V2,
+        friction: F,
+        surface_velocity: V2,
+        parameters: Parameters,
         time_step: F,
     ) -> V:
         """Change of the phases' velocities at the surface. `mass` is a volume: each phase's mass is its density times
@@ -83,9 +87,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             change = wp.max(target - solid_normal, F(0.0))
         result = V()
         if TWO_PHASE:
-            result = V(
-                change * normal[0], change * normal[1], liquid_change * normal[0], liquid_change * normal[1]
-            )
+            result = V(change * normal[0], change * normal[1], liquid_change * normal[0], liquid_change * normal[1])
         else:
             result = change * normal
         if FRICTION:
@@ -155,8 +157,17 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
 
     @wp.func
     def fixed_surface(
-        grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, mi: wp.int32, mj: wp.int32, normal: V2,
-        friction: F, time_step: F, surface: wp.int32, reactions: wp.array(dtype=wp.float64),
+        grid: Grid,
+        parameters: Parameters,
+        i: wp.int32,
+        j: wp.int32,
+        mi: wp.int32,
+        mj: wp.int32,
+        normal: V2,
+        friction: F,
+        time_step: F,
+        surface: wp.int32,
+        reactions: wp.array(dtype=wp.float64),
     ):
         """A surface at rest between node (i, j) behind it and its mirror image (mi, mj); (i, j) again: no mirror."""
         mass = grid.mass[i, j]
@@ -209,7 +220,16 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                             grid, parameters, i, row - 1, i, row, up, friction, time_step, wp.static(GROUND), reactions
                         )
                         fixed_surface(
-                            grid, parameters, i, row - 2, i, row - 2, up, friction, time_step, wp.static(GROUND),
+                            grid,
+                            parameters,
+                            i,
+                            row - 2,
+                            i,
+                            row - 2,
+                            up,
+                            friction,
+                            time_step,
+                            wp.static(GROUND),
                             reactions,
                         )
 
@@ -221,18 +241,24 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
         def side_walls(
             grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
         ):
-            """Smooth walls at rest. Seen from a grid that rides with a barrier they move, so each acts at the line of cell
-            corners nearest to it."""
+            """Smooth walls at rest. Seen from a grid that rides with a barrier they move, so each acts at the line of
+            cell corners nearest to it."""
             j = wp.tid()
             time_step = F(clock[wp.static(TIME_STEP)])
             origin = parameters.left + F(clock[wp.static(GRID_SHIFT)])
             none = F(0.0)
-            c = wp.int32(wp.clamp((parameters.left_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9)))
+            c = wp.int32(
+                wp.clamp((parameters.left_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9))
+            )
             if c >= 2 and c < parameters.columns:
                 right = V2(F(1.0), F(0.0))
                 fixed_surface(grid, parameters, c - 1, j, c, j, right, none, time_step, wp.static(LEFT_WALL), reactions)
-                fixed_surface(grid, parameters, c - 2, j, c - 2, j, right, none, time_step, wp.static(LEFT_WALL), reactions)
-            c = wp.int32(wp.clamp((parameters.right_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9)))
+                fixed_surface(
+                    grid, parameters, c - 2, j, c - 2, j, right, none, time_step, wp.static(LEFT_WALL), reactions
+                )
+            c = wp.int32(
+                wp.clamp((parameters.right_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9))
+            )
             if c >= 1 and c < parameters.columns - 1:
                 left = V2(F(-1.0), F(0.0))
                 fixed_surface(grid, parameters, c, j, c - 1, j, left, none, time_step, wp.static(RIGHT_WALL), reactions)
@@ -255,7 +281,9 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             down = V2(F(0.0), F(-1.0))
             none = F(0.0)
             fixed_surface(grid, parameters, i, row + 1, i, row, down, none, time_step, wp.static(CEILING), reactions)
-            fixed_surface(grid, parameters, i, row + 2, i, row + 2, down, none, time_step, wp.static(CEILING), reactions)
+            fixed_surface(
+                grid, parameters, i, row + 2, i, row + 2, down, none, time_step, wp.static(CEILING), reactions
+            )
 
         kernels["ceiling"] = ceiling
 
@@ -296,7 +324,10 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
 
         @wp.kernel(module=module)
         def barrier(
-            contact: Contact, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64),
+            contact: Contact,
+            grid: Grid,
+            parameters: Parameters,
+            clock: wp.array(dtype=wp.float64),
             reactions: wp.array(dtype=wp.float64),
         ):
             e = wp.tid()
@@ -307,8 +338,14 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                 node = contact.node[e]
                 mirror = contact.mirror[e]
                 change = respond(
-                    mass, contact.velocity[e], contact.liquid_free[e], contact.normal[e], contact.friction[e],
-                    surface_velocity, parameters, time_step,
+                    mass,
+                    contact.velocity[e],
+                    contact.liquid_free[e],
+                    contact.normal[e],
+                    contact.friction[e],
+                    surface_velocity,
+                    parameters,
+                    time_step,
                 )
                 if contact.pair[e] == 1:
                     add(grid, node[0], node[1], change * (F(0.5) * mass / grid.mass[node[0], node[1]]))

@@ -31,7 +31,7 @@ BARRIER_WORK = 6
 """Work of the flow on the barrier [J/m]."""
 BASE_FRICTION_WORK = 7
 BASE_FRICTION_IMPULSE = 8
-"""Time integral of the friction force at the barrier's base, positive when it acts on the barrier downstream [N s/m]."""
+"""Time integral of the friction force at the barrier's base, positive when it acts downstream [N s/m]."""
 EXTERNAL_IMPULSE = 9
 EXTERNAL_FORCE = 10
 GRAVITY_IMPULSE_X = 11

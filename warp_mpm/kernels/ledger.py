@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import warp as wp
 
 from .layout import (
+    GRID_SHIFT,
     LEDGER_ELASTIC,
     LEDGER_GRAVITATIONAL,
     LEDGER_KINETIC,
     LEDGER_LIQUID_MASS,
     LEDGER_MOMENTUM_X,
     LEDGER_MOMENTUM_Y,
-    GRID_SHIFT,
     LEDGER_NOT_FINITE,
     LEDGER_PRESSURE_MAX,
     LEDGER_PRESSURE_MEAN,

@@ -104,7 +104,7 @@ def yield_constants(
     cohesion: float,
     tension_cutoff: float,
 ) -> dict[str, float]:
-    """Fields of the kernels' parameters that the return mapping reads. Moduli, cohesion, cut-off in Pa, angles in rad."""
+    """Fields of the parameters that the return mapping reads. Moduli, cohesion, cut-off in Pa, angles in rad."""
     sine, sine_flow = math.sin(friction_angle), math.sin(dilatancy_angle)
     coupled = 4.0 * lame * sine * sine_flow
     plane = coupled + 4.0 * shear_modulus * (1.0 + sine * sine_flow)

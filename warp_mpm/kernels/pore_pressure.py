@@ -25,9 +25,7 @@ def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
         """Porosity now: Dn/Dt = n_S div v_S, of which Eq. (A11) keeps only the zero; the grains keep their volume."""
         result = parameters.porosity
         if POROSITY:
-            result = wp.max(
-                F(1.0) - (F(1.0) - parameters.porosity) * reference / volume, F(wp.static(LEAST_POROSITY))
-            )
+            result = wp.max(F(1.0) - (F(1.0) - parameters.porosity) * reference / volume, F(wp.static(LEAST_POROSITY)))
         return result
 
     return SimpleNamespace(pressure=pressure, porosity=porosity)

@@ -35,7 +35,6 @@ def make_transfer(
     FLIP = effects.transfer == "flip"
     APIC = effects.transfer == "apic"
     CORNERS = effects.smoothing_grid
-    SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
@@ -291,7 +290,9 @@ def make_transfer(
                 if points.surrounded[p] == 1:
                     residual = points.pressure_residual[p]
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
-                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(parameters.gravity, x)
+                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(
+                    parameters.gravity, x
+                )
             for k in range(2):
                 for m in range(2):
                     h = hx[k] * hy[m] * reference
