@@ -1,0 +1,130 @@
+"""Contact with ground and barrier: reactions, momentum, friction, and what leaves the domain."""
+
+import numpy as np
+import pytest
+
+from warp_mpm.simulation import Simulation
+
+SLAB = {"kind": "polygon", "vertices_m": [[-30, 0], [-6, 0], [-6, 1], [-30, 1]]}
+"""24 m long and 1 m high, away from the barrier: its ends matter little."""
+
+
+def scene(load_scene, name="case_1", **changes):
+    """A shipped scene, coarse, with changes."""
+    return load_scene(name, **{"numerics.spacing_m": 0.5, "output.end_time_s": 1.0} | changes)
+
+
+def momentum(simulation):
+    points = simulation.points()
+    total = points["solid_mass"] @ points["solid_velocity"]
+    if "liquid_velocity" in points:
+        return total + points["liquid_mass"] @ points["liquid_velocity"]
+    return total + points["liquid_mass"] @ points["solid_velocity"]
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_1_dry", "case_1_undrained", "case_1_fixed"])
+def test_reactions_are_the_momentum_change(load_scene, name):
+    """Forces, averaged over each interval, are what the flow lost beyond gravity's share: Eq. (A14), both directions."""
+    simulation = Simulation(scene(load_scene, name))
+    begin, impulse, mass = momentum(simulation), np.zeros(2), 81_000.0
+    if name == "case_1_dry":
+        mass = float(simulation.points()["solid_mass"].sum())
+    for time in np.linspace(0.1, 1.0, 10):
+        simulation.advance(time)
+        sample = simulation.sample()
+        surfaces = [key[:-2] for key in sample if key.endswith("_force_x")]
+        impulse += 0.1 * np.array([sum(sample[f"{key}_{axis}"] for key in surfaces) for axis in "xy"])
+        # The simulation's own ledger says the same, of the points alone.
+        assert abs(sample["momentum_residual_x"]) < 1e-9 * begin[0]
+        assert abs(sample["momentum_residual_y"]) < 1e-9 * begin[0]
+    assert simulation.record["points_left"] == 0
+    assert impulse[0] > 0.05 * begin[0]  # the flow did hit the barrier
+    weight = np.array([0.0, -9.81 * mass])
+    np.testing.assert_allclose(momentum(simulation), begin + weight - impulse, atol=1e-9 * begin[0])
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_1_undrained"])
+def test_no_friction_on_what_leaves_the_ground(load_scene, name):
+    """Water-laden material under stress that lifts off a rough ground is not held back along it."""
+    changes = {
+        "ground.friction": 0.6,
+        "flow.shape": SLAB,
+        "flow.velocity_m_per_s": [5.0, 3.0],
+        "output.end_time_s": 0.05,
+    }
+    simulation = Simulation(scene(load_scene, name, **changes))
+    begin = momentum(simulation)
+    simulation.advance(0.05)
+    sample = simulation.sample()
+    assert sample["ground_force_x"] == 0.0
+    assert sample["ground_force_y"] == 0.0
+    assert momentum(simulation)[0] == pytest.approx(begin[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_1_undrained"])
+def test_ground_friction_feels_the_effective_weight_alone(load_scene, name):
+    """A saturated slab at rest slides on rough ground: the friction is tan delta times its weight under buoyancy."""
+    friction, speed = 0.3, 2.0
+    changes = {"ground.friction": friction, "flow.shape": SLAB, "flow.velocity_m_per_s": [speed, 0.0]}
+    simulation = Simulation(scene(load_scene, name, **changes))
+    simulation.advance(0.1)
+    sample = simulation.sample()
+    material = simulation.scenario.flow.material
+    effective = (material.density - material.liquid_density_kg_per_m3) * 9.81 * 24.0
+    # The slab's two ends, each about its height long, slump: 2 of 24 m.
+    assert sample["ground_force_x"] == pytest.approx(friction * effective, rel=0.08)
+    assert sample["ground_force_y"] == pytest.approx(-material.density * 9.81 * 24.0, rel=0.08)
+
+
+def test_a_smooth_ground_does_not_hold_back(load_scene):
+    changes = {"flow.shape": SLAB, "flow.velocity_m_per_s": [2.0, 0.0]}
+    simulation = Simulation(scene(load_scene, **changes))
+    begin = momentum(simulation)[0]
+    simulation.advance(0.1)
+    assert simulation.sample()["ground_force_x"] == 0.0
+    assert momentum(simulation)[0] == pytest.approx(begin, rel=1e-12)
+
+
+def test_a_block_thrown_flat_at_a_wall_gives_up_its_momentum(load_scene):
+    """Dry block on smooth ground against the upright wall without end: it stops, or bounces, but does not pass."""
+    scenario = load_scene("case_5", **{"numerics.spacing_m": 0.5})
+    simulation = Simulation(scenario)
+    simulation.advance(1.0)
+    # At most half a cell inside the solid.
+    assert simulation.points()["position"][:, 0].max() < 0.25
+    assert simulation.points()["position"][:, 1].min() > -0.25
+
+
+def test_points_that_leave_are_counted(load_scene):
+    changes = {"domain.left_m": -24.0, "domain.right_m": 12.0, "flow.velocity_m_per_s": [-10.0, 0.0]}
+    simulation = Simulation(scene(load_scene, **changes))
+    begin, mass = momentum(simulation), 81_000.0
+    inside = simulation.material_points
+    simulation.advance(1.0)
+    sample = simulation.sample()
+    left = simulation.record["points_left"]
+    points = simulation.points()
+    assert left > 100
+    assert len(points["position"]) == inside - left
+    remaining = points["solid_mass"].sum() + points["liquid_mass"].sum()
+    assert sample["left_mass"] == pytest.approx(mass - remaining, rel=1e-9)
+    # They took their speed with them: the 10 m/s of all, and what a front gains that spreads under its own weight.
+    assert 10.0 < -sample["left_momentum_x"] / sample["left_mass"] < 14.0
+    assert abs(sample["momentum_residual_x"]) < 1e-9 * abs(begin[0])
+    assert abs(sample["momentum_residual_y"]) < 1e-9 * abs(begin[0])
+    assert sample["left_energy"] > 0.4 * 100.0 * sample["left_mass"]
+
+
+def test_the_shipped_scenes_keep_both_phases_apart_from_the_barrier(load_scene):
+    """No point of the flow ends up more than half a cell inside the trapezoid."""
+    simulation = Simulation(scene(load_scene, "case_1_fixed"))
+    simulation.advance(1.0)
+    position = simulation.points()["position"]
+    shape = simulation.scenario.barrier.shape
+    base, crest, height = shape.base_crest_height
+    run = 0.5 * (base - crest)
+    length = np.hypot(run, height)
+    face = (-height * position[:, 0] + run * position[:, 1]) / length
+    back = (height * (position[:, 0] - base) + run * position[:, 1]) / length
+    depth = np.maximum(np.maximum(face, back), position[:, 1] - height)
+    assert depth.min() > -0.25

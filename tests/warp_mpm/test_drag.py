@@ -1,0 +1,93 @@
+"""Drag between the phases, semi-implicit and explicit, against the exact decay of their relative velocity."""
+
+import numpy as np
+import pytest
+
+from warp_mpm.simulation import Simulation
+
+BLOCK = {"kind": "polygon", "vertices_m": [[-12, 4], [-8, 4], [-8, 8], [-12, 8]]}
+CONDUCTIVITY = 0.05
+# Rate at which v_L - v_S decays: n^2 rho_L g / k (1 / n_S rho_S + 1 / n rho_L).
+RATE = 0.25 * 1000.0 * 9.81 / CONDUCTIVITY * (1.0 / 1300.0 + 1.0 / 500.0)
+DURATION = 0.02
+
+
+def flying_block(load_scene, drag, courant_number):
+    """A block far from everything, no gravity, its liquid faster than its solid."""
+    changes = {
+        "numerics.spacing_m": 0.5,
+        "numerics.drag": drag,
+        "numerics.courant_number": courant_number,
+        "gravity.acceleration_m_per_s2": 0.0,
+        "flow.shape": BLOCK,
+        "flow.velocity_m_per_s": [0.0, 0.0],
+        "flow.initial_stress": "zero",
+        "flow.material.hydraulic_conductivity_m_per_s": CONDUCTIVITY,
+        "output.end_time_s": DURATION,
+    }
+    simulation = Simulation(load_scene("case_1", **changes))
+    number = simulation.material_points
+    simulation.set_points(liquid_velocity=np.tile([1.0, -0.5], (number, 1)))
+    return simulation
+
+
+def relative_velocity(simulation):
+    """Mean of v_L - v_S [2] m/s."""
+    points = simulation.points()
+    solid, liquid = points["solid_mass"], points["liquid_mass"]
+    return liquid @ points["liquid_velocity"] / liquid.sum() - solid @ points["solid_velocity"] / solid.sum()
+
+
+@pytest.mark.parametrize(("drag", "sign"), [("semi_implicit", 1.0), ("explicit", -1.0)])
+def test_relative_velocity_decays_at_the_rate_of_darcys_law(load_scene, drag, sign):
+    """First order in the step, from above if implicit, from below if explicit; both to the exact exponential. Inside the
+    block the phases push on each other too, but over the whole block these forces cancel."""
+    exact = np.array([1.0, -0.5]) * np.exp(-RATE * DURATION)
+    errors = []
+    for courant_number in (0.8, 0.4, 0.2):
+        simulation = flying_block(load_scene, drag, courant_number)
+        simulation.advance(DURATION)
+        errors.append((relative_velocity(simulation) - exact) / exact)
+    errors = np.array(errors)
+    assert (sign * errors > 0.0).all()
+    # Half the step, half the error: to within the second-order term, of the size of the error itself.
+    np.testing.assert_allclose(errors[1:] / errors[:-1], 0.5, atol=np.abs(errors[0]).max())
+    # Next to nothing remains when both extremes are extrapolated to a step of zero.
+    assert np.abs(2.0 * errors[2] - errors[1]).max() < 0.02
+
+
+def test_both_ways_agree_as_the_step_goes_to_zero(load_scene):
+    """The whole fields, not their means alone."""
+    differences = []
+    for courant_number in (0.4, 0.2, 0.1):
+        fields = []
+        for drag in ("semi_implicit", "explicit"):
+            simulation = flying_block(load_scene, drag, courant_number)
+            simulation.advance(DURATION)
+            fields.append(simulation.points()["liquid_velocity"])
+        differences.append(np.abs(fields[0] - fields[1]).max())
+    ratios = np.divide(differences[1:], differences[:-1])
+    np.testing.assert_allclose(ratios, 0.5, atol=0.1)
+
+
+def test_momentum_passes_from_phase_to_phase_and_none_is_lost(load_scene):
+    simulation = flying_block(load_scene, "semi_implicit", 0.8)
+    simulation.advance(DURATION)
+    points = simulation.points()
+    total = points["solid_mass"] @ points["solid_velocity"] + points["liquid_mass"] @ points["liquid_velocity"]
+    np.testing.assert_allclose(total, 16.0 * 500.0 * np.array([1.0, -0.5]), rtol=1e-12)
+
+
+def test_explicit_drag_pays_in_steps(load_scene):
+    """At k = 1e-4 m/s: the step falls to the time in which the phases' velocities meet, and the record says so."""
+    records = {}
+    for drag in ("semi_implicit", "explicit"):
+        simulation = Simulation(load_scene("case_1", **{"numerics.spacing_m": 0.5, "numerics.drag": drag}))
+        simulation.advance(0.02)
+        records[drag] = simulation.record
+    implicit, explicit = records["semi_implicit"], records["explicit"]
+    assert explicit["steps"] > 40 * implicit["steps"]
+    assert explicit["steps_limited_by_drag"] >= explicit["steps"] - 1
+    assert implicit["steps_limited_by_wave"] >= implicit["steps"] - 1
+    # 0.95 of the uniform-slip limit 2 k n_S rho_S / (n g rho_m) = 2.94e-5 s.
+    assert explicit["time_step_max"] == pytest.approx(0.95 * 2.94e-5, rel=0.01)

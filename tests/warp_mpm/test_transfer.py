@@ -1,0 +1,238 @@
+"""Scatter and gather of a few random points against sums written out in NumPy."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warp_mpm.kernels import layout as at
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+
+GRAVITY = np.array([0.3, -9.7])
+TIME_STEP = 2e-4
+
+
+def weights_and_slopes(simulation, position):
+    """Splines [N, columns, rows] of every node at every point, and their gradient [N, columns, rows, 2] [1/m]."""
+    x, y = simulation.grid.node_positions()
+    spacing = simulation.grid.spacing
+
+    def spline(r):
+        a = np.abs(r)
+        value = np.where(a < 0.5, 0.75 - a**2, np.where(a < 1.5, 0.5 * (1.5 - a) ** 2, 0.0))
+        slope = np.where(a < 0.5, -2.0 * r, np.where(a < 1.5, -(1.5 - a) * np.sign(r), 0.0))
+        return value, slope / spacing
+
+    wx, dx = spline((position[:, :1] - x) / spacing)
+    wy, dy = spline((position[:, 1:] - y) / spacing)
+    weight = wx[:, :, None] * wy[:, None, :]
+    return weight, np.stack([dx[:, :, None] * wy[:, None, :], wx[:, :, None] * dy[:, None, :]], axis=-1)
+
+
+class Bench:
+    """A simulation with a random state, whose kernels are launched one by one."""
+
+    def __init__(self, scenario):
+        changes = {
+            "numerics.spacing_m": 0.5, "output.end_time_s": 0.2, "domain.left_m": -24.0, "domain.right_m": 13.0,
+            "domain.top_m": 8.0, "gravity.tilt_deg": 1.0,
+        }  # fmt: skip
+        self.simulation = simulation = Simulation(scenario.replaced(changes))
+        simulation._parameters.gravity = simulation._types.V2(*GRAVITY)
+        self.material = simulation.scenario.flow.material
+        self.two_phase = simulation.effects.two_phase
+        self.number = number = simulation.material_points
+        generator = np.random.default_rng(3)
+        self.position = np.stack([generator.uniform(-17, -3, number), generator.uniform(0.5, 4.5, number)], axis=1)
+        phases = 2 if self.two_phase else 1
+        self.velocity = generator.normal(scale=5.0, size=(number, 2 * phases))
+        self.stress = generator.normal(scale=2e4, size=(number, 4))
+        self.reference = generator.uniform(0.05, 0.08, number)
+        self.volume = self.reference * generator.uniform(0.9, 1.1, number)
+        self.set(position=self.position, velocity=self.velocity, stress=self.stress, volume=self.volume)
+        self.set(reference_volume=self.reference)
+        self.pressure = np.zeros(number)
+        if simulation.effects.liquid:
+            self.pressure = generator.uniform(1e3, 3e4, number)
+            self.set(liquid_strain=-self.pressure / self.material.liquid_bulk_modulus_Pa)
+        self.viscous = generator.uniform(0.0, 3e3, number)
+        self.set(viscous_pressure=self.viscous)
+        self.affine = np.zeros((number, 2 * phases, 2))
+        if simulation.effects.transfer == "apic":
+            self.affine = generator.normal(size=(number, 2 * phases, 2))
+            self.set(affine_x=self.affine[:, :, 0], affine_y=self.affine[:, :, 1])
+        clock = simulation._clock.numpy()
+        clock[at.TIME_STEP] = TIME_STEP
+        simulation._clock.assign(clock)
+        self.density = np.repeat([self.material.solid_partial_density, self.material.liquid_partial_density], 2)
+        self.density = self.density[: 2 * phases]
+        self.weight, self.slope = weights_and_slopes(simulation, self.position)
+
+    def set(self, **arrays):
+        for name, values in arrays.items():
+            self.simulation._point_arrays[name].assign(values)
+
+    def get(self, name):
+        return self.simulation._point_arrays[name].numpy()
+
+    def scatter(self):
+        simulation = self.simulation
+        grid, parameters = simulation._grid, simulation._parameters
+        simulation._launch("clear", simulation._workers, grid, parameters)
+        simulation._launch("forget", 1, grid)
+        simulation._launch("scatter", self.number, simulation._points, grid, parameters, simulation._clock)
+        return {name: array.numpy() for name, array in simulation._grid_arrays.items()}
+
+    def gather(self, velocity, increment=None):
+        simulation = self.simulation
+        simulation._grid_arrays["velocity"].assign(velocity)
+        if increment is not None:
+            simulation._grid_arrays["increment"].assign(increment)
+        simulation._launch(
+            "gather", self.number, simulation._points, simulation._grid, simulation._parameters, simulation._clock
+        )
+
+    def internal_force(self):
+        """Force [columns, rows, 2 phases] on the nodes [N/m], of the total stress of each phase (audit, section 3.4)."""
+        n = self.material.porosity if self.two_phase else 0.0
+        pressure = self.pressure + self.viscous
+        xx, yy, _, xy = self.stress.T
+        tensor = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
+        solid = tensor - (1.0 - n) * pressure[:, None, None] * np.eye(2)
+        force = -np.einsum("p,pab,pijb->ija", self.volume, solid, self.slope)
+        if self.two_phase:
+            liquid = np.einsum("p,pija->ija", self.volume * n * pressure, self.slope)
+            force = np.concatenate([force, liquid], axis=-1)
+        return force
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    folder = Path(__file__).parents[2] / "scenarios"
+    return {name: Scenario.load(folder / f"{name}.json") for name in ("case_1", "case_1_dry")}
+
+
+@pytest.fixture(scope="module")
+def affine(scenes):
+    return Bench(scenes["case_1"])
+
+
+@pytest.fixture(scope="module")
+def flip(scenes):
+    return Bench(scenes["case_1_dry"].replaced({"numerics.transfer": "flip", "numerics.pic_share": 0.25}))
+
+
+def test_mass_and_momentum_with_the_forces_share_reach_the_nodes(affine):
+    """APIC: a node receives the momentum at the end of the step, internal force and gravity included."""
+    grid = affine.scatter()
+    x, y = affine.simulation.grid.node_positions()
+    node = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    away = node[None] - affine.position[:, None, None, :]
+    field = affine.velocity[:, None, None, :] + np.einsum("pab,pijb->pija", affine.affine, away)
+    field = field + TIME_STEP * np.tile(GRAVITY, 2)
+    mass = np.einsum("p,pij->ij", affine.reference, affine.weight)
+    momentum = np.einsum("p,pij,pija->ija", affine.reference, affine.weight, field)
+    momentum += TIME_STEP * affine.internal_force() / affine.density
+    np.testing.assert_allclose(grid["mass"], mass, atol=1e-14)
+    np.testing.assert_allclose(grid["momentum"], momentum, atol=1e-13 * np.abs(momentum).max())
+
+
+def test_flip_keeps_momentum_and_force_apart(flip):
+    grid = flip.scatter()
+    momentum = np.einsum("p,pij,pa->ija", flip.reference, flip.weight, flip.velocity)
+    force = flip.internal_force()
+    np.testing.assert_allclose(grid["momentum"], momentum, atol=1e-13 * np.abs(momentum).max())
+    np.testing.assert_allclose(grid["force"], force, atol=1e-13 * np.abs(force).max())
+
+
+def test_internal_forces_add_up_to_nothing(affine):
+    """Action and reaction: per phase the forces of the points on the nodes sum to zero."""
+    grid = affine.scatter()
+    total = grid["momentum"].sum(axis=(0, 1))
+    alone = affine.reference @ (affine.velocity + TIME_STEP * np.tile(GRAVITY, 2))
+    scale = affine.reference @ np.abs(affine.velocity)
+    np.testing.assert_allclose(total, alone, atol=1e-12 * scale.max())
+
+
+def test_only_blocks_with_material_are_in_use_and_all_are_emptied(affine):
+    grid = affine.scatter()
+    rows = affine.simulation.grid.rows // at.BLOCK
+    listed = grid["active"][: grid["active_count"][0]]
+    assert len(set(listed)) == len(listed)
+    marked = np.zeros_like(grid["block"], dtype=bool)
+    marked[listed // rows, listed % rows] = True
+    touched = grid["mass"] > 0.0
+    blocks = touched.reshape(marked.shape[0], at.BLOCK, marked.shape[1], at.BLOCK).any(axis=(1, 3))
+    np.testing.assert_array_equal(marked, blocks)
+    np.testing.assert_array_equal(affine.scatter()["mass"], grid["mass"])  # nothing of before is left
+
+
+def random_velocities(bench, seed=5):
+    grid = bench.simulation.grid
+    return np.random.default_rng(seed).normal(size=(grid.columns, grid.rows, bench.velocity.shape[1]))
+
+
+def test_gather_brings_velocity_gradient_and_affine_field(affine):
+    nodes = random_velocities(affine)
+    affine.gather(nodes)
+    gradient = np.einsum("pija,ijb->pba", affine.slope, nodes)  # [p, component, direction]
+    np.testing.assert_allclose(affine.get("velocity"), np.einsum("pij,ija->pa", affine.weight, nodes), atol=1e-14)
+    solid = gradient[:, :2].reshape(-1, 4)
+    np.testing.assert_allclose(affine.get("gradient"), solid, atol=1e-12)
+    liquid = gradient[:, 2, 0] + gradient[:, 3, 1]
+    np.testing.assert_allclose(affine.get("liquid_divergence"), liquid, atol=1e-12)
+    x, y = affine.simulation.grid.node_positions()
+    node = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    away = node[None] - affine.position[:, None, None, :]
+    # C = sum w v (x_i - x_p) 4 / d^2, Jiang et al. (2015) for quadratic splines.
+    field = np.einsum("pij,ija,pijb->pab", affine.weight, nodes, away) * 4.0 / affine.simulation.grid.spacing**2
+    np.testing.assert_allclose(affine.get("affine_x"), field[:, :, 0], atol=1e-12)
+    np.testing.assert_allclose(affine.get("affine_y"), field[:, :, 1], atol=1e-12)
+
+
+def test_a_linear_velocity_field_arrives_as_it_is(affine):
+    x, y = affine.simulation.grid.node_positions()
+    node = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    slope = np.array([[0.5, -2.0], [1.5, 0.25], [-1.0, 0.75], [3.0, -0.5]])
+    affine.gather(1.0 + node @ slope.T)
+    np.testing.assert_allclose(affine.get("velocity"), 1.0 + affine.position @ slope.T, atol=1e-12)
+    np.testing.assert_allclose(affine.get("gradient"), np.tile(slope[:2].ravel(), (affine.number, 1)), atol=1e-11)
+
+
+def test_flip_adds_the_increment_and_the_given_share_of_the_grids_velocity(flip):
+    flip.set(velocity=flip.velocity)
+    nodes, increment = random_velocities(flip), random_velocities(flip, seed=6)
+    flip.gather(nodes, increment)
+    smooth = np.einsum("pij,ija->pa", flip.weight, nodes)
+    kept = flip.velocity + np.einsum("pij,ija->pa", flip.weight, increment)
+    share = 0.25 * TIME_STEP * flip.simulation._limits.sound_speed / flip.simulation.grid.spacing
+    np.testing.assert_allclose(flip.get("velocity"), kept + share * (smooth - kept), atol=1e-13)
+
+
+def test_affine_transfer_conserves_linear_and_angular_momentum(affine):
+    """To the grid and back, without gravity: the momentum of the affine fields themselves included."""
+    bench, spacing = affine, affine.simulation.grid.spacing
+    bench.set(velocity=bench.velocity, affine_x=bench.affine[:, :, 0], affine_y=bench.affine[:, :, 1])
+
+    def momenta(velocity, affine):
+        linear = bench.reference @ velocity
+        angular = []
+        for a in (0, 2):
+            orbital = bench.position[:, 0] * velocity[:, a + 1] - bench.position[:, 1] * velocity[:, a]
+            spin = 0.25 * spacing**2 * (affine[:, a + 1, 0] - affine[:, a, 1])
+            angular.append(bench.reference @ (orbital + spin))
+        return np.concatenate([linear, angular])
+
+    before = momenta(bench.velocity, bench.affine)
+    bench.simulation._parameters.gravity = bench.simulation._types.V2(0.0, 0.0)
+    try:
+        grid = bench.scatter()
+    finally:
+        bench.simulation._parameters.gravity = bench.simulation._types.V2(*GRAVITY)
+    mass = grid["mass"][..., None]
+    # The internal forces ride along; of symmetric stresses they conserve both momenta too.
+    bench.gather(np.divide(grid["momentum"], mass, out=np.zeros_like(grid["momentum"]), where=mass > 0.0))
+    after = momenta(bench.get("velocity"), np.stack([bench.get("affine_x"), bench.get("affine_y")], axis=-1))
+    scale = bench.reference @ np.abs(bench.velocity).max(axis=1) * np.abs(bench.position).max()
+    np.testing.assert_allclose(after, before, atol=1e-12 * scale)
