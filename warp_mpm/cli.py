@@ -59,8 +59,8 @@ def run(
     """Simulate a scenario and write its results into a folder.
 
     The folder then holds the key figures (summary.json), the time series (timeseries.csv), the material points at
-    intervals (snapshots.vtkhdf, for ParaView and h5py), two figures (PNG), the resolved scenario (scenario.json) and
-    the record of the run (run.json).
+    intervals and barrier and ground beside them (snapshots.vtkhdf and surfaces.vtkhdf, for ParaView and h5py), two
+    figures (PNG), the resolved scenario (scenario.json) and the record of the run (run.json).
 
     Ctrl-C ends the run cleanly and keeps all that was computed. A run that was interrupted, by whatever, goes on with
     --resume DIR, and on the CPU gives the same numbers as one that was not.

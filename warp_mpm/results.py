@@ -183,6 +183,62 @@ class Results:
         """
         return read_time_series(self.path / run_folder.TIME_SERIES)
 
+    def frame(self) -> Any:
+        """The time series as a pandas DataFrame, indexed by time [s]; `frame.attrs["units"]` has each column's unit and
+        `frame.attrs["meanings"]` what it is. Needs pandas.
+
+        Raises:
+            ResultsError: the file is missing or damaged.
+        """
+        import pandas as pd
+
+        series = self.time_series
+        known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
+        columns = {name: values for name, values in series.items() if name != "time"}
+        frame = pd.DataFrame(columns, index=pd.Index(series["time"], name="time"))
+        frame.attrs["units"] = {name: known[name].unit for name in series}
+        frame.attrs["meanings"] = {name: known[name].meaning for name in series}
+        return frame
+
+    def dataset(self) -> Any:
+        """The snapshots as an xarray Dataset over (time, point), with `units` and `long_name` on every variable; the
+        time series of the barrier's displacement goes with them. Needs xarray.
+
+        Where points have left the domain, the rows of later times are filled up with NaN, and a row is then no longer
+        the same point at all times.
+
+        Raises:
+            ResultsError: the file is missing or damaged.
+        """
+        import xarray as xr
+
+        frames = list(self.snapshots)
+        most = max((len(frame.position) for frame in frames), default=0)
+
+        def stacked(arrays: list[Array]) -> Array:
+            whole = np.full((len(arrays), most, *arrays[0].shape[1:]), np.nan)
+            for index, values in enumerate(arrays):
+                whole[index, : len(values)] = values
+            return whole
+
+        kinds = {1: (), 2: ("axis",), 4: ("component",)}
+        variables: dict[str, Any] = {}
+        for name in ("position", *self.snapshots.names):
+            arrays = [frame.position if name == "position" else frame[name] for frame in frames]
+            width = arrays[0].shape[1] if arrays[0].ndim == 2 else 1
+            unit, meaning = (
+                ("m", "position") if name == "position" else (POINT_FIELDS[name].unit, POINT_FIELDS[name].meaning)
+            )
+            variables[name] = (("time", "point", *kinds[width]), stacked(arrays), {"units": unit, "long_name": meaning})
+        shifts = [np.nan if frame.barrier_displacement is None else frame.barrier_displacement for frame in frames]
+        variables["barrier_displacement"] = ("time", shifts, {"units": "m", "long_name": "displacement of the barrier"})
+        coordinates = {
+            "time": ("time", [frame.time for frame in frames], {"units": "s"}),
+            "axis": ["x", "y"],
+            "component": ["xx", "yy", "zz", "xy"],
+        }
+        return xr.Dataset(variables, coordinates, {"title": self.scenario.title})
+
     @cached_property
     def snapshots(self) -> Snapshots:
         """The snapshots, read one at a time.

@@ -14,6 +14,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warp_mpm import plotting
 from warp_mpm.recording import (
     Checkpointer,
@@ -27,6 +29,7 @@ from warp_mpm.recording import (
 )
 from warp_mpm.recording.checkpoint import Checkpoint, versions
 from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.surfaces import write_surfaces
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Scenario
 from warp_mpm.summary import summarize
@@ -236,10 +239,25 @@ def evaluate(path: Path) -> dict[str, Any]:
         of_the_run = {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
         summary = run_folder.finite(summarize(results.scenario, results.time_series, snapshots, of_the_run))
         folder.write(run_folder.SUMMARY, summary)
+        _write_surfaces(results, path)
         with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
             plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
         plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
     return summary
+
+
+def _write_surfaces(results: Results, path: Path) -> None:
+    """Barrier and ground beside the snapshots, as far as the material reaches."""
+    snapshots = results.snapshots
+    displacements, edges = [], []
+    for snapshot in snapshots:
+        displacements.append(snapshot.barrier_displacement)
+        x, y = snapshot.position.T if len(snapshot.position) else np.zeros((2, 1))
+        edges.append((x.min(), x.max(), y.max()))
+    if edges:
+        left, right, top = np.array(edges).T
+        extent = (float(left.min()), float(right.max()), float(top.max()))
+        write_surfaces(results.scenario, snapshots.times.tolist(), displacements, extent, path / run_folder.SURFACES)
 
 
 def _ruling_limit(record: dict[str, Any]) -> str | None:

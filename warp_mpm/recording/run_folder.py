@@ -19,6 +19,8 @@ SCENARIO = "scenario.json"
 RECORD = "run.json"
 TIME_SERIES = "timeseries.csv"
 SNAPSHOTS = "snapshots.vtkhdf"
+SURFACES = "surfaces.vtkhdf"
+"""Barrier and ground; there unless the scene has neither."""
 SUMMARY = "summary.json"
 FORCE_PLOT = "force_and_displacement.png"
 PRESSURE_PLOT = "pore_pressure.png"
@@ -27,7 +29,7 @@ CHECKPOINT = "checkpoint.bin"
 REPORT = "report.html"
 """There only where it was asked for."""
 
-OWN_FILES = (SCENARIO, RECORD, TIME_SERIES, SNAPSHOTS, SUMMARY, FORCE_PLOT, PRESSURE_PLOT)
+OWN_FILES = (SCENARIO, RECORD, TIME_SERIES, SNAPSHOTS, SURFACES, SUMMARY, FORCE_PLOT, PRESSURE_PLOT)
 """All that a finished run leaves."""
 
 ASIDE = ".new"
