@@ -11,7 +11,6 @@ import json
 import os
 import queue
 import subprocess
-import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -47,7 +46,7 @@ class WorkerProcess:
 
     def __init__(self, resources: str) -> None:
         interpreter, import_path = find_interpreter(resources)
-        environment = {name: value for name, value in os.environ.items() if name not in _HOST_ONLY}
+        environment = {name: value for name, value in os.environ.items() if name.upper() not in _HOST_ONLY}
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
         self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         try:
@@ -190,7 +189,3 @@ def _read_lines(pipe: IO[bytes], answers: queue.SimpleQueue[bytes | None]) -> No
                 parts = []
             parts.append(rest)
     answers.put(_END)
-
-
-if sys.platform == "win32":
-    _HOST_ONLY = tuple(name.upper() for name in _HOST_ONLY)
