@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .discretization import material_points
 from .effects import Effects
-from .grid import contact_nodes, fit_grid, open_corner_volumes
+from .grid import barrier_planes, contact_nodes, fit_grid, open_corner_volumes
 from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.mohr_coulomb import yield_constants
@@ -168,6 +168,13 @@ class Simulation:
             right = domain.right_m if domain.right_m is not None else x_right - 4 * self.grid.spacing
             values["left_wall"] = left if domain.left_edge == "wall" else -far
             values["right_wall"] = right if domain.right_edge == "wall" else far
+        if scenario.barrier is not None:
+            planes = {surface: (normal, offset) for surface, normal, offset in barrier_planes(scenario.barrier)}
+            nowhere = ((0.0, 1.0), 1e30)
+            values["face_normal"] = self._types.V2(*planes[at.FACE][0])
+            values["crest_height"] = planes.get(at.TOP, nowhere)[1]
+            values["back_normal"] = self._types.V2(*planes.get(at.BACK, nowhere)[0])
+            values["back_offset"] = planes.get(at.BACK, nowhere)[1]
         if effects.barrier == "sliding":
             assert scenario.barrier is not None
             assert isinstance(scenario.barrier.motion, Sliding)
@@ -586,6 +593,7 @@ class Simulation:
             "barrier_iterations": int(counters[at.BARRIER_ITERATIONS]),
             "barrier_unconverged": int(counters[at.BARRIER_UNCONVERGED]),
             "points_left": int(counters[at.POINTS_LEFT]),
+            "points_pushed_out": int(counters[at.POINTS_PUSHED]),
         }
 
     def _state_arrays(self) -> dict[str, Any]:

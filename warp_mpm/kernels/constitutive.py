@@ -15,6 +15,7 @@ from .layout import (
     LEFT_SOLID_MASS,
     OLD_BARRIER_VELOCITY,
     POINTS_LEFT,
+    POINTS_PUSHED,
     TIME_STEP,
 )
 from .mohr_coulomb import make_return_mapping
@@ -40,6 +41,8 @@ def make_constitutive(
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
     PLASTICITY = effects.plasticity
+    GROUND = effects.ground != "none"
+    BARRIER = effects.barrier != "none"
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
@@ -195,6 +198,24 @@ def make_constitutive(
         else:
             v = points.velocity[p]
             x += time_step * V2(v[0], v[1])
+        depth = F(-0.5) * parameters.spacing
+        if GROUND:
+            if x[1] < depth:
+                x[1] = depth
+                wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
+        if BARRIER:
+            seen = x - V2(shift, F(0.0))
+            face = wp.dot(parameters.face_normal, seen)
+            top = seen[1] - parameters.crest_height
+            back = wp.dot(parameters.back_normal, seen) - parameters.back_offset
+            if face < depth and top < depth and back < depth:
+                wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
+                if face >= top and face >= back:
+                    x += (depth - face) * parameters.face_normal
+                elif top >= back:
+                    x[1] += depth - top
+                else:
+                    x += (depth - back) * parameters.back_normal
         points.position[p] = x
 
         # The grid as it will lie in the next step: whatever a barrier's speed, no point then reaches beyond it.

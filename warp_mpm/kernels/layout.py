@@ -60,7 +60,9 @@ LIMIT_OUTPUT = 4
 BARRIER_ITERATIONS = 5
 BARRIER_UNCONVERGED = 6
 POINTS_LEFT = 7
-COUNTERS_SIZE = 8
+POINTS_PUSHED = 8
+"""Times that a point deeper than half a cell in a solid was set back to that depth."""
+COUNTERS_SIZE = 9
 
 # Surfaces on which reactions are recorded: impulse on the surface in x and y, each a pair in one float64 array.
 FACE = 0
@@ -226,6 +228,11 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["right_wall"] = scalar
     if effects.ceiling:
         parameters["ceiling_row"] = wp.int32  # last row of nodes below the upper wall
+    if effects.barrier != "none":
+        parameters["face_normal"] = V2
+        parameters["crest_height"] = scalar  # far above: a wall without end
+        parameters["back_normal"] = V2
+        parameters["back_offset"] = scalar
     if effects.barrier == "sliding":
         parameters["barrier_mass"] = wp.float64
         parameters["barrier_weight"] = wp.float64
