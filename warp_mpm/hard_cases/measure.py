@@ -1,0 +1,218 @@
+"""Runs a scene and measures what the criteria ask for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm.grid import barrier_planes
+from warp_mpm.hard_cases.criteria import CRITERIA, Criterion, speed_bound
+from warp_mpm.recording import Schedule
+from warp_mpm.results import Snapshot
+from warp_mpm.scenario import STANDARD_GRAVITY, Scenario
+from warp_mpm.simulation import Simulation, SimulationDiverged
+from warp_mpm.summary import energy_error, impact_figures, momentum_error
+from warp_mpm.time_step import step_limits
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Measured:
+    """A hard case after its run."""
+
+    figures: dict[str, float]
+    """By the names in `CRITERIA`, and some more that say how the run went."""
+    problem: str | None = None
+    """What `SimulationDiverged` said."""
+    last: Snapshot | None = field(default=None, repr=False)
+    peak: Snapshot | None = field(default=None, repr=False)
+    """At the greatest pore pressure (speed, if dry)."""
+
+    def failures(self, scenario: Scenario) -> list[tuple[Criterion, float]]:
+        """Criteria that were not met, with their figures."""
+        return [
+            (criterion, self.figures[criterion.figure])
+            for criterion in CRITERIA
+            # Not "greater": a figure that is no number has failed.
+            if criterion.figure in self.figures and not self.figures[criterion.figure] <= criterion.limit_for(scenario)
+        ]
+
+
+def measure(
+    scenario: Scenario, *, halve: bool = False, make_simulation: Callable[[Scenario], Any] = Simulation
+) -> Measured:
+    """Run `scenario` and take its figures; with `halve` once more at half the time step."""
+    measured = _run(scenario, make_simulation)
+    if halve and measured.problem is None and scenario.barrier is not None:
+        halved = scenario.replaced({"numerics.courant_number": 0.5 * scenario.numerics.courant_number})
+        other = _run(halved, make_simulation)
+        scale = 0.1 * scenario.flow.material.density * scenario.flow.speed**2 * scenario.flow.depth
+        for figure, name, least in (
+            ("halving_peak_force", "peak_force_filtered", scale),
+            ("halving_displacement", "barrier_displacement_final", scenario.numerics.spacing_m),
+        ):
+            ours, theirs = measured.figures.get(name), other.figures.get(name)
+            if ours is not None and theirs is not None:
+                measured.figures[figure] = abs(ours - theirs) / max(abs(ours), abs(theirs), least)
+    return measured
+
+
+def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Measured:
+    started = time.perf_counter()
+    simulation = make_simulation(scenario)
+    output, end_time = scenario.output, scenario.output.end_time_s
+    samples: list[dict[str, float]] = []
+    noise: list[float] = []
+    extremes = {"penetration": 0.0, "porosity_low": -1.0, "porosity_high": 0.0, "yield_excess": 0.0}
+    measured = Measured({"diverged": 0.0})
+    series, snapshots = Schedule(output.time_series_interval_s), Schedule(output.snapshot_interval_s)
+    try:
+        while True:
+            if series.due(simulation.time) or simulation.time >= end_time:
+                samples.append(simulation.sample())
+            if snapshots.due(simulation.time) or simulation.time >= end_time:
+                snapshot = _snapshot(simulation)
+                if len(snapshot.position) > 0:
+                    _widen(extremes, scenario, snapshot)
+                    noise.extend(_pressure_noise(scenario, snapshot))
+                    if measured.peak is None or _violence(snapshot) > _violence(measured.peak):
+                        measured.peak = snapshot
+                measured.last = snapshot
+            if simulation.time >= end_time:
+                break
+            simulation.advance(min(end_time, series.next_time, snapshots.next_time))
+    except SimulationDiverged as error:
+        measured.figures["diverged"], measured.problem = 1.0, str(error)
+    columns = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+    measured.figures |= (
+        extremes
+        | _of_the_series(scenario, columns)
+        | {
+            "points": float(simulation.material_points),
+            "steps": float(simulation.steps),
+            "left_share": simulation.record["points_left"] / simulation.material_points,
+            "wall_time": time.perf_counter() - started,
+        }
+    )
+    if noise:
+        measured.figures["pressure_noise"] = float(np.median(noise))
+    return measured
+
+
+def _snapshot(simulation: Any) -> Snapshot:
+    points = simulation.points()
+    return Snapshot(simulation.time, simulation.barrier_displacement, points.pop("position"), points)
+
+
+def _violence(snapshot: Snapshot) -> float:
+    if "pore_pressure" in snapshot:
+        return float(snapshot["pore_pressure"].max())
+    return float(np.abs(snapshot["solid_velocity"]).max())
+
+
+def _of_the_series(scenario: Scenario, columns: dict[str, Array]) -> dict[str, float]:
+    figures: dict[str, float] = {}
+    inside = columns["solid_mass"] + columns.get("liquid_mass", 0.0)
+    whole = inside + columns["left_mass"]
+    figures["mass_error"] = float(np.abs(whole - whole[0]).max() / whole[0])
+    closed = momentum_error(columns, scenario.gravity.acceleration_m_per_s2)
+    if closed is not None:
+        figures["momentum_error"] = closed
+    created = energy_error(columns)
+    if created is not None:
+        # A driven barrier puts energy in by its work, and gravity on a slope by the fall.
+        start = sum(abs(columns[f"flow_{kind}_energy"][0]) for kind in ("kinetic", "gravitational", "elastic"))
+        gained = float(np.max(-columns.get("barrier_work", np.zeros(1))))
+        fallen = float(np.max(columns["flow_gravitational_energy"][0] - columns["flow_gravitational_energy"]))
+        figures["energy_error"] = created * start / (start + max(gained, 0.0) + max(fallen, 0.0))
+    fastest = float(columns["speed_max"].max())
+    figures |= {"speed_max": fastest, "speed_ratio": fastest / max(speed_bound(scenario), 1e-9)}
+    if "pore_pressure_max_anywhere" in columns:
+        material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
+        still = material.density * scenario.gravity.acceleration_m_per_s2 * depth
+        hammer = material.density * step_limits(scenario).sound_speed * fastest
+        greatest = float(columns["pore_pressure_max_anywhere"].max())
+        figures |= {"pore_pressure_max": greatest, "pressure_ratio": greatest / (hammer + still)}
+    impact = impact_figures(columns["time"], columns.get("impact_force_x"))
+    if impact["peak_force_filtered"] is not None:
+        figures["peak_force_filtered"] = impact["peak_force_filtered"]
+    if "barrier_displacement" in columns:
+        figures["barrier_displacement_final"] = float(columns["barrier_displacement"][-1])
+    return figures
+
+
+def _widen(extremes: dict[str, float], scenario: Scenario, snapshot: Snapshot) -> None:
+    # Of the volumes: the porosity that a scene holds constant would tell nothing.
+    porosity = 1.0 - snapshot["solid_mass"] / (scenario.flow.material.grain_density_kg_per_m3 * snapshot["volume"])
+    found = {
+        "penetration": _penetration(scenario, snapshot),
+        "porosity_low": -float(porosity.min()),
+        "porosity_high": float(porosity.max()),
+        "yield_excess": _yield_excess(scenario, snapshot["effective_stress"]),
+    }
+    for name, value in found.items():
+        extremes[name] = float(np.maximum(extremes[name], value))  # which keeps NaN
+
+
+def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
+    """Depth [cells] of the deepest point inside a solid."""
+    x, y = snapshot.position.T
+    depth = np.zeros(len(x))
+    if scenario.ground is not None:
+        depth = np.maximum(depth, -y)
+    domain = scenario.domain
+    if domain.left_edge == "wall" and domain.left_m is not None:
+        depth = np.maximum(depth, domain.left_m - x)
+    if domain.right_edge == "wall" and domain.right_m is not None:
+        depth = np.maximum(depth, x - domain.right_m)
+    if domain.top_edge == "wall" and domain.top_m is not None:
+        depth = np.maximum(depth, y - domain.top_m)
+    if scenario.barrier is not None:
+        x = x - (snapshot.barrier_displacement or 0.0)
+        planes = barrier_planes(scenario.barrier)
+        inside = np.min([offset - nx * x - ny * y for _, (nx, ny), offset in planes], axis=0)
+        depth = np.maximum(depth, inside)
+    return float(depth.max() / scenario.numerics.spacing_m)
+
+
+def _yield_excess(scenario: Scenario, stress: Array) -> float:
+    material = scenario.flow.material
+    if not material.plasticity:
+        return 0.0
+    xx, yy, zz, xy = stress.T
+    mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
+    first, last = principal[2], principal[0]
+    sine, cosine = (
+        math.sin(math.radians(material.friction_angle_deg)),
+        math.cos(math.radians(material.friction_angle_deg)),
+    )
+    cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
+    apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
+    excess = np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
+    return float(max(excess.max(), 0.0) / max(np.abs(principal).max(), material.cohesion_Pa, 1.0))
+
+
+def _pressure_noise(scenario: Scenario, snapshot: Snapshot) -> list[float]:
+    """One figure, or none where no cell holds three points."""
+    if "pore_pressure" not in snapshot or len(snapshot.position) < 3:
+        return []
+    pressure = snapshot["pore_pressure"]
+    cells = np.floor(snapshot.position / scenario.numerics.spacing_m).astype(np.int64)
+    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    cell = cell.ravel()
+    full = count[cell] >= 3
+    if not full.any():
+        return []
+    mean = np.bincount(cell, pressure) / count
+    material = scenario.flow.material
+    still = material.density * STANDARD_GRAVITY * scenario.flow.depth
+    scale = max(float(np.sqrt(np.mean(pressure[full] ** 2))), still)
+    return [float(np.sqrt(np.mean((pressure - mean[cell])[full] ** 2)) / scale)]
