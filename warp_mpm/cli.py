@@ -32,14 +32,20 @@ def main() -> None:
 
 
 @app.command(
-    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib --spacing 0.25 --until 2"
+    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib --spacing 0.25 --until 2; "
+    "several at once: python -m warp_mpm run scenarios/case_*.json --jobs 4"
 )
 def run(
-    scenario_file: Annotated[
-        Path | None, typer.Argument(metavar="SCENARIO", help="Scenario file (JSON).", show_default=False)
+    scenario_files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="SCENARIO...", help="Scenario files (JSON); several run at once.", show_default=False),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the results.", show_default="runs/NAME of the scenario")
+        Path | None,
+        typer.Option(
+            help="Folder for the results; of several scenarios, the folder of their folders.",
+            show_default="runs/NAME of the scenario",
+        ),
     ] = None,
     device: Annotated[str, typer.Option(help="Warp device: cpu, cuda:0, ...")] = "cpu",
     spacing: Annotated[
@@ -55,6 +61,9 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Go on with the interrupted run in this folder.", show_default=False),
     ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Scenarios at a time.", show_default="number of cores")
+    ] = None,
 ) -> None:
     """Simulate a scenario and write its results into a folder.
 
@@ -67,6 +76,14 @@ def run(
 
     Exit codes: 0 done, 2 the input cannot be used, 3 the simulation diverged, 130 interrupted.
     """
+    if scenario_files and len(scenario_files) > 1:
+        if resume is not None:
+            _refuse("--resume DIR goes on with one run; it takes no scenario files.")
+        from warp_mpm.commands.several import run_several
+
+        run_several(scenario_files, out, jobs, _options(device, spacing, until, report, force), quiet)
+        return
+    scenario_file = scenario_files[0] if scenario_files else None
     if resume is not None:
         if scenario_file is not None or out is not None or spacing is not None or until is not None or force:
             _refuse("--resume DIR goes on with a run as it was begun; beside it only --device and --quiet are allowed.")
@@ -167,6 +184,14 @@ def schema() -> None:
 
 
 register(app)
+
+
+def _options(device: str, spacing: float | None, until: float | None, report: bool, force: bool) -> list[str]:
+    """The options of `run`, as they are typed."""
+    options = ["--device", device]
+    for name, value in (("--spacing", spacing), ("--until", until)):
+        options += [name, repr(value)] if value is not None else []
+    return options + ["--report"] * report + ["--force"] * force
 
 
 def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenario:

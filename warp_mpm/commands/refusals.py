@@ -22,7 +22,7 @@ def refusals() -> Iterator[None]:
         raise typer.Exit(BAD_INPUT) from None
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        complain(f"{place}{error.strerror or error}.".replace("..", "."))
+        complain(f"{place}{error.strerror or error}".rstrip(".") + ".")
         raise typer.Exit(BAD_INPUT) from None
 
 

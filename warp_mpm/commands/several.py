@@ -1,0 +1,122 @@
+"""`python -m warp_mpm run A.json B.json ...`: several scenes at once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from warp_mpm.commands.refusals import complain, refusals
+
+DIVERGED, INTERRUPTED = 3, 130
+"""Exit codes of `run` that leave results behind."""
+
+
+def run_several(files: list[Path], out: Path | None, jobs: int | None, options: list[str], quiet: bool) -> None:
+    """Run each scene in a process of its own and tell how each went.
+
+    Args:
+        files: scenarios, all checked before any begins.
+        out: the folder in which each gets a folder of its name; None: runs.
+        jobs: at the same time; None: as many as there are cores.
+        options: of `run`, handed on to each.
+        quiet: print errors only.
+
+    Raises:
+        typer.Exit: 2 when a file cannot be used and nothing was begun; otherwise the greatest exit code of the runs.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from warp_mpm.batch import Job, JobEnd, run_jobs
+    from warp_mpm.recording.run_folder import RunFolder
+    from warp_mpm.scenario import Scenario
+    from warp_mpm.terminal import StopOnSignal
+
+    with refusals():
+        if len({file.stem for file in files}) < len(files):
+            raise ValueError("Two of the scenarios have the same file name, so they would share a folder.")
+        until = options[options.index("--until") + 1] if "--until" in options else None
+        planned = []
+        for file in files:
+            scenario, folder = Scenario.load(file), (out or Path("runs")) / file.stem
+            RunFolder.check(folder, force="--force" in options)
+            end_time = float(until) if until is not None else scenario.output.end_time_s
+            planned.append(Job(file.stem, folder, (str(file), "--out", str(folder), *options), end_time))
+
+    console = Console(quiet=quiet, stderr=True, highlight=False, markup=False)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.fields[state]}"),
+        TimeRemainingColumn(),
+    )
+    with StopOnSignal() as signal, Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+        tasks: dict[str, Any] = {
+            job.name: bars.add_task(job.name, total=job.end_time, state="waiting") for job in planned
+        }
+
+        def began(job: Job) -> None:
+            bars.update(tasks[job.name], state="preparing")
+            if not console.is_terminal:
+                console.print(f"{job.name}: begun", soft_wrap=True)
+
+        def ended(end: JobEnd) -> None:
+            state = "done" if end.code == 0 else f"exit code {end.code}"
+            bars.update(tasks[end.job.name], completed=end.job.end_time if end.code == 0 else None, state=state)
+            if not console.is_terminal:
+                console.print(f"{end.job.name}: {state}", soft_wrap=True)
+
+        ends = run_jobs(
+            planned,
+            at_once=jobs or os.cpu_count() or 1,
+            on_start=began,
+            on_progress=lambda job, time: bars.update(tasks[job.name], completed=time, state=f"t = {time:.2f} s"),
+            on_end=ended,
+            stop=lambda: signal.received,
+        )
+    for end in ends:
+        if end.code != 0:
+            complain(f"{end.job.name}: {end.message or f'ended with exit code {end.code}'}")
+    if not quiet:
+        begun = [end for end in ends if end.code in (0, DIVERGED, INTERRUPTED)]
+        _print([end.job.folder for end in sorted(begun, key=lambda end: planned.index(end.job))])
+    code = max((end.code if end.code > 0 else 1 for end in ends if end.code != 0), default=0)
+    if code or signal.received:
+        raise typer.Exit(INTERRUPTED if signal.received else code)
+
+
+def _print(folders: list[Path]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from warp_mpm.results import Results, ResultsError
+
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 160  # a file has no edge to fit to
+    table = Table(box=box.SIMPLE_HEAD)
+    for heading in ("run", "status", "peak F₂ₓ [kN/m]", "impulse [kN s/m]", "Δx [m]", "mechanism", "wall time [s]"):
+        table.add_column(heading, justify="left" if heading in ("run", "status", "mechanism") else "right")
+    for folder in folders:
+        try:
+            summary = Results.open(folder).summary
+        except ResultsError:
+            continue
+
+        def cell(name: str, factor: float = 1.0, summary: dict[str, Any] = summary) -> str:
+            return "–" if summary.get(name) is None else f"{summary[name] * factor:,.4g}"
+
+        table.add_row(
+            str(folder),
+            str(summary.get("status")),
+            cell("peak_force_filtered", 1e-3),
+            cell("impulse", 1e-3),
+            cell("barrier_displacement_final"),
+            summary.get("mechanism") or "–",
+            cell("wall_time"),
+        )
+    console.print(table)
