@@ -261,7 +261,9 @@ def test_hanging_worker_is_ended(open_unit: Open) -> None:
 @posix_only
 @pytest.mark.parametrize("ending", ["terminate", "free", "reset"])
 def test_no_process_is_left(ending: str, host_class: Any, archives: dict[str, Path], unzipped: dict[str, Path]) -> None:
+    """Neither with a state that the importer forgot to free."""
     host = host_class(archives["DebrisFlow"], unzipped["DebrisFlow"]).initialize(**QUICK).run(0.1)
+    host.fmu.getFMUstate()
     (process_id,) = workers()
     if ending == "terminate":
         host.fmu.terminate()
