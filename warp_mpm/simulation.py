@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,47 +13,25 @@ import warp as wp
 from numpy.typing import NDArray
 
 from .discretization import material_points
-from .effects import Effects
+from .effect_rules import derive_effects
 from .grid import barrier_planes, contact_nodes, fit_grid, open_corner_volumes
 from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.mohr_coulomb import yield_constants
 from .kernels.pore_pressure import LEAST_POROSITY
-from .scenario import STANDARD_GRAVITY, DryFlow, Prescribed, Scenario, Sliding, Trapezoid, TwoPhaseFlow
+from .scenario import STANDARD_GRAVITY, Prescribed, Scenario, Sliding, Trapezoid
 from .time_step import step_limits
 
-wp.config.log_level = wp.LOG_WARNING
+
+def _start_warp() -> None:
+    """Start Warp without its banner, and without a warning on machines that have no GPU, which is no fault."""
+    wp.config.log_level = wp.LOG_ERROR
+    wp.init()
+    wp.config.log_level = wp.LOG_WARNING
 
 
 class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
     """The run left the range of sense; the message says when and what to try."""
-
-
-def derive_effects(scenario: Scenario) -> Effects:
-    """The effects that `scenario` calls for, by rules that a person can read."""
-    flow, numerics, barrier, ground = scenario.flow, scenario.numerics, scenario.barrier, scenario.ground
-    motion = "none"
-    if barrier is not None:
-        motion = {"fixed": "fixed", "sliding": "sliding", "prescribed": "driven"}[barrier.motion.kind]
-    liquid = not isinstance(flow, DryFlow)
-    surface = "none" if ground is None else "frictional" if ground.friction > 0.0 else "smooth"
-    return Effects(
-        formulation=flow.formulation,
-        precision=numerics.precision,
-        plasticity=flow.material.plasticity,
-        volumetric_smoothing=numerics.volumetric_smoothing,
-        pressure_relaxation=liquid and numerics.pressure_relaxation > 0.0,
-        transfer=numerics.transfer,
-        drag=numerics.drag if isinstance(flow, TwoPhaseFlow) else "none",
-        porosity_update=isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update,
-        barrier=motion,  # type: ignore[arg-type]
-        barrier_friction=barrier is not None
-        and max(barrier.friction.face, barrier.friction.top, barrier.friction.back) > 0.0,
-        bulk_viscosity=numerics.bulk_viscosity > 0.0,
-        ceiling=scenario.domain.top_edge == "wall",
-        ground=surface,  # type: ignore[arg-type]
-        side_walls="wall" in (scenario.domain.left_edge, scenario.domain.right_edge),
-    )
 
 
 class Simulation:
@@ -73,6 +52,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, *, device: str = "cpu") -> None:
         self.scenario = scenario
         self.effects = derive_effects(scenario)
+        _start_warp()
         try:
             self.device = wp.get_device(device)
         except ValueError:
@@ -90,6 +70,8 @@ class Simulation:
         self._make_barrier()
         self._make_clock()
         self._graph: Any = None
+        self._on_launch: Callable[[str], None] | None = None
+        self._kernels_of_a_step: tuple[str, ...] = ()
         self._last = self._totals()
         mass = self._initial.solid_mass.sum() + self._initial.liquid_mass.sum()
         self._initial_momentum = mass * np.array(scenario.flow.velocity_m_per_s)
@@ -285,6 +267,8 @@ class Simulation:
     # -- stepping ----------------------------------------------------------------------------------------------
 
     def _launch(self, name: str, dim: Any, *arguments: Any) -> None:
+        if self._on_launch is not None:
+            self._on_launch(name)
         wp.launch(getattr(self._kernels, name), dim=dim, inputs=list(arguments), device=self.device)
 
     def _step(self) -> None:
@@ -336,6 +320,33 @@ class Simulation:
         )
         wp.capture_while(self._running, self._step)
 
+    def _prepare(self) -> None:
+        """Compile the kernels and capture an interval, once."""
+        if self._graph is None:
+            names: list[str] = []
+            wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
+            self._on_launch = names.append
+            with wp.ScopedCapture(device=self.device) as capture:
+                self._interval()
+            self._on_launch = None
+            self._kernels_of_a_step = tuple(names[1:])  # the first one starts the interval
+            self._graph = capture.graph
+
+    @property
+    def launched_kernels(self) -> tuple[str, ...]:
+        """Names of the kernels that a step launches, in their order, as captured; the first call compiles them."""
+        self._prepare()
+        return self._kernels_of_a_step
+
+    @property
+    def arrays(self) -> dict[str, int]:
+        """Every array that the simulation holds on the device, by name, with its bytes."""
+        groups = {"points": self._point_arrays, "grid": self._grid_arrays, "contact": self._contact_arrays}
+        held = {f"{group}.{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
+        for name in ("clock", "counters", "running", "reactions", "left", "sums", "target", "times", "velocities"):
+            held[name] = getattr(self, f"_{name}")
+        return {name: int(array.capacity) for name, array in held.items()}
+
     def advance(self, until: float) -> None:
         """Run to the time `until` [s], exactly.
 
@@ -346,11 +357,7 @@ class Simulation:
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
         wp.copy(self._clock, self._array(np.array([until]), wp.float64), dest_offset=at.TARGET, count=1)
-        if self._graph is None:
-            wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
-            with wp.ScopedCapture(device=self.device) as capture:
-                self._interval()
-            self._graph = capture.graph
+        self._prepare()
         wp.capture_launch(self._graph)
         if int(self._counters.numpy()[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
