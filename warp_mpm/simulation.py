@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
+import tempfile
 from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,11 +27,28 @@ from .scenario import STANDARD_GRAVITY, Prescribed, Scenario, Sliding, Trapezoid
 from .time_step import step_limits
 
 
+@cache
 def _start_warp() -> None:
-    """Start Warp without its banner, and without a warning on machines that have no GPU, which is no fault."""
-    wp.config.log_level = wp.LOG_ERROR
-    wp.init()
+    """Start Warp without its banner, and without its warning that a machine has no GPU, which is no fault of anyone's.
+
+    Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on.
+    """
     wp.config.log_level = wp.LOG_WARNING
+    sys.stderr.flush()
+    stderr = os.dup(2)
+    try:
+        with tempfile.TemporaryFile() as caught:
+            os.dup2(caught.fileno(), 2)
+            try:
+                wp.init()
+            finally:
+                os.dup2(stderr, 2)
+            caught.seek(0)
+            for line in caught:
+                if b"Could not find or load the NVIDIA CUDA driver" not in line:
+                    os.write(2, line)
+    finally:
+        os.close(stderr)
 
 
 class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
