@@ -126,20 +126,25 @@ def coefficients(scene: Scene, constants: Constants | None = None) -> Coefficien
 def _impulse(scene: Scene, peak_force: float, rise_time: float, kappa: float) -> float:
     """Impulse [N s/m] of ``momentum_closed`` for a given peak force and rise time, instead of a given duration.
 
-    With T2 = 2 J / F and tau T2 = T1 its equation is linear: J (1/mu - 2 G/F) = v - G R T1 / (2 F), where
-    G = g tan(delta_b), R is the threshold force, and mu the reduced mass of the flow and the driven mass.
+    With T2 = 2 J / F its equation reads J (1/m1 + (1 - 2 R/F + tau R^2/F^2) / m) = v, where m is the driven mass and R
+    the threshold force; and tau = T1 / T2 makes it linear in J again. tau is at most 1.
     """
     stopping = scene.flow_mass * scene.speed
-    if scene.barrier_mass is None or not scene.base_friction:
-        return stopping if scene.barrier_mass is None else stopping / (1 + scene.flow_mass / scene.barrier_mass)
-    driven_mass = scene.barrier_mass / (1 - kappa * scene.base_friction)
-    deceleration = scene.gravity * scene.base_friction
-    threshold = driven_mass * deceleration
-    inverse_mass = 1 / scene.flow_mass + 1 / driven_mass - 2 * deceleration / peak_force
-    momentum = scene.speed - deceleration * threshold * rise_time / (2 * peak_force)
-    if peak_force <= threshold or momentum >= inverse_mass * stopping:
-        return stopping  # the barrier has stopped by T2, or has not moved at all
-    return momentum / inverse_mass
+    if scene.barrier_mass is None:
+        return stopping
+    friction = scene.base_friction or 0.0
+    driven_mass = scene.barrier_mass / (1 - kappa * friction)
+    threshold = driven_mass * scene.gravity * friction
+    r = threshold / peak_force
+    if r >= 1:
+        return stopping  # the barrier does not move
+    rising_to_the_end = scene.speed / (1 / scene.flow_mass + (1 - r) ** 2 / driven_mass)
+    if rising_to_the_end <= peak_force * rise_time / 2:
+        return min(rising_to_the_end, stopping)
+    inverse_mass = 1 / scene.flow_mass + (1 - 2 * r) / driven_mass
+    momentum = scene.speed - r**2 * peak_force * rise_time / (2 * driven_mass)
+    # Where the barrier would stop before T2, the flow comes to rest and no common velocity is left.
+    return momentum / inverse_mass if 0 < momentum < inverse_mass * stopping else stopping
 
 
 def calibrated_impact(scene: Scene, **model: Any) -> Impact:

@@ -17,6 +17,8 @@ from analytic.calibration import Calibration, KeyFigures, moving_mean
 from analytic.field_data import SYNTHETIC, Agreement, Events
 from analytic.impact import Impact
 from analytic.reliability import Reliability
+from analytic.sweep import Run
+from analytic.sweep_fit import SMALL_DISPLACEMENT
 
 Array = NDArray[np.float64]
 
@@ -231,6 +233,31 @@ def _watermark(axis: Axes) -> None:
         0.5, 0.5, SYNTHETIC, transform=axis.transAxes, fontsize=30, color=GREY, alpha=0.25, ha="center", va="center",
         rotation=30, zorder=0,
     )  # fmt: skip
+
+
+def sweep(runs: Sequence[Run], predictions: Mapping[str, Sequence[Impact]]) -> Figure:
+    """Closed-form over simulated peak force and final displacement of each run, one colour for each rule."""
+    figure = Figure(figsize=(10, 4.8), layout="constrained")
+    force, moved = figure.subplots(1, 2)
+    small = np.array([0.0 if run.fixed else SMALL_DISPLACEMENT * run.flow_height for run in runs])
+    slides = ~np.array([run.fixed for run in runs])
+    simulated = np.array([run.peak_force for run in runs]) / 1e3
+    slid = np.array([run.barrier_displacement_final for run in runs])[slides] + small[slides]
+    for colour, (name, impacts) in zip((SKY, ORANGE, GREEN), predictions.items(), strict=False):
+        found = np.array([impact.peak_force for impact in impacts]) / 1e3
+        force.loglog(simulated, found, "o", color=colour, markersize=3.5, label=name)
+        found = np.array([impact.barrier_displacement_final for impact in impacts])[slides] + small[slides]
+        moved.loglog(slid, found, "o", color=colour, markersize=3.5, label=name)
+    for axis, values, what in ((force, simulated, "peak force [kN/m]"), (moved, slid, "displacement + 0.05 h [m]")):
+        ends = np.array([0.7 * values.min(), 1.4 * values.max()])
+        axis.plot(ends, ends, color="black", linewidth=0.9)
+        for factor in (0.5, 2):
+            axis.plot(ends, factor * ends, color="black", linewidth=0.7, linestyle=":")
+        axis.set_xlabel(f"simulated {what}")
+        axis.set_ylabel(f"closed-form {what}")
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8, title="dotted: factor of two", title_fontsize=8)
+    return figure
 
 
 def design_chart(

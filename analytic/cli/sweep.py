@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from analytic.cli.terminal import AsJson, number, print_json, print_table, refusals
+from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
 
 sweep = typer.Typer(help="Fit the calibrated variant to a sweep of simulations.", no_args_is_help=True)
 
@@ -67,24 +67,32 @@ def collect(
 def fit(
     table: Annotated[Path, typer.Argument(help="Table of the sweep.")],
     as_json: AsJson = False,
+    plot: Plot = None,
 ) -> None:
     """Fit the constants and say how well they predict scenes they were not fitted to."""
     with refusals():
         from analytic import sweep as scenes
         from analytic import sweep_fit
 
+        check_plot(plot)
         runs = scenes.read_table(table)
         content: dict[str, Any] = {}
-        rows = []
+        rows, drawn, papers, held_out = [], [], [], []
         for kind, fixed in (("sliding", False), ("fixed", True)):
             usable = sweep_fit.usable(runs, fixed)
             if len(usable) < 4 * sweep_fit.FOLDS:
                 raise ValueError(f"{table} holds {len(usable)} usable runs with a {kind} barrier, a fit needs 20.")
-            before = sweep_fit.score(usable, [sweep_fit.paper_rule(run.scene) for run in usable])
-            after = sweep_fit.score(usable, sweep_fit.cross_validated(usable))
+            paper, calibrated = [sweep_fit.paper_rule(run.scene) for run in usable], sweep_fit.cross_validated(usable)
+            before, after = sweep_fit.score(usable, paper), sweep_fit.score(usable, calibrated)
+            drawn += usable
+            papers += [run.scene.impact(**numbers.model) for run, numbers in zip(usable, paper, strict=True)]
+            held_out += [run.scene.impact(**numbers.model) for run, numbers in zip(usable, calibrated, strict=True)]
             constants = sweep_fit.fit(usable)
             content[kind] = {"constants": vars(constants), "paper": vars(before), "calibrated": vars(after)}
             rows += [_row(f"{kind}, paper's constants", before), _row(f"{kind}, calibrated", after)]
+        if plot is not None:
+            rules = {"paper's constants": papers, "calibrated, held out": held_out}
+            write_plot(lambda: _figure(drawn, rules), plot)
         if as_json:
             print_json(content)
             return
@@ -106,6 +114,12 @@ def fit(
             *(f"{kind}: {found['constants']}" for kind, found in content.items()),
         ]
         print_table("Closed form against simulations", header, rows, notes)
+
+
+def _figure(runs: Any, rules: Any) -> Any:
+    from analytic import plots
+
+    return plots.sweep(runs, rules)
 
 
 def _row(name: str, found: Any) -> list[str]:

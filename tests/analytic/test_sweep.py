@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from analytic import fitted, sweep, sweep_fit
@@ -302,3 +304,36 @@ def test_predict_and_design_offer_the_calibrated_variant() -> None:
     again = answer("predict", path, "--variant", "calibrated", "--barrier-mass", repr(design["mass"]),
                    "--face-angle", repr(design["face_angle_deg"]))  # fmt: skip
     assert again["barrier_displacement_final"] == pytest.approx(1, abs=1e-4)
+
+
+@given(
+    speed=st.floats(0.1, 60),
+    height=st.floats(0.1, 20),
+    length_ratio=st.floats(1, 100),
+    mass_ratio=st.floats(0.01, 100),
+    base_friction=st.floats(0, 1.5),
+    face_angle=st.floats(5, 90),
+)
+def test_any_scene_has_calibrated_numbers_and_its_peak_force(
+    speed: float, height: float, length_ratio: float, mass_ratio: float, base_friction: float, face_angle: float
+) -> None:
+    mass = 1800 * length_ratio * height**2
+    scene = Scene(
+        flow_mass=mass,
+        flow_length=length_ratio * height,
+        flow_height=height,
+        speed=speed,
+        barrier_mass=mass_ratio * mass,
+        base_friction=base_friction,
+        face_angle=face_angle,
+    )
+    numbers = coefficients(scene)
+    impact = calibrated_impact(scene)
+    at, turned = CONSTANTS["sliding"], 1 - math.cos(math.radians(face_angle))
+    pressure = at.jet * turned + at.weight / scene.froude_number**2
+    pressure *= (mass_ratio / (1 + mass_ratio)) ** at.mass_exponent
+    found = impact.peak_force / (1800 * height * speed**2)
+    if numbers.geometry_change < 1:
+        assert found == pytest.approx(pressure, rel=1e-6)
+    else:
+        assert found >= pressure * (1 - 1e-9)
