@@ -1,0 +1,160 @@
+"""Which effects a scene calls for, and why: one rule per effect, read by the simulation and by the run card alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .effects import Effects
+from .scenario import DryFlow, Scenario, Sliding, TwoPhaseFlow
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a scene decides about one effect."""
+
+    effect: str
+    """Name of the field of `Effects`."""
+    value: str | bool
+    reason: str
+    """Why, in the words of the scenario file."""
+    switched: Mapping[str, Any] = field(default_factory=dict)
+    """Changes of the scenario that switch the effect off, or to its cheaper kind; empty where none does."""
+
+    @property
+    def on(self) -> bool:
+        """Whether the effect is present."""
+        return self.value not in (False, "none")
+
+
+def derive_effects(scenario: Scenario) -> Effects:
+    """The effects that `scenario` calls for, by the rules of `effect_rules`."""
+    chosen: dict[str, Any] = {rule.effect: rule.value for rule in effect_rules(scenario)}
+    return Effects(**chosen)
+
+
+def effect_rules(scenario: Scenario) -> list[Rule]:
+    """One rule per field of `Effects`: the flow, the numerics, the surfaces."""
+    return [*_material_rules(scenario), *_numerical_rules(scenario), *_surface_rules(scenario)]
+
+
+def _material_rules(scenario: Scenario) -> list[Rule]:
+    flow = scenario.flow
+    drag: str = scenario.numerics.drag if isinstance(flow, TwoPhaseFlow) else "none"
+    porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
+    return [
+        Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
+        Rule(
+            "plasticity",
+            flow.material.plasticity,
+            _setting("flow.material.plasticity", flow.material.plasticity),
+            {"flow.material.plasticity": False},
+        ),
+        Rule(
+            "drag",
+            drag,
+            f"two phases, numerics.drag = {drag}" if drag != "none" else "there are no two phases",
+        ),
+        Rule(
+            "porosity_update",
+            porosity,
+            _setting("flow.material.porosity_update", porosity) if drag != "none" else "there are no two phases",
+            {"flow.material.porosity_update": False},
+        ),
+    ]
+
+
+def _numerical_rules(scenario: Scenario) -> list[Rule]:
+    numerics = scenario.numerics
+    liquid = not isinstance(scenario.flow, DryFlow)
+    relaxation = f"numerics.pressure_relaxation = {numerics.pressure_relaxation:g}"
+    return [
+        Rule("precision", numerics.precision, f"numerics.precision = {numerics.precision}"),
+        Rule(
+            "volumetric_smoothing",
+            numerics.volumetric_smoothing,
+            _setting("numerics.volumetric_smoothing", numerics.volumetric_smoothing),
+            {"numerics.volumetric_smoothing": False},
+        ),
+        Rule(
+            "pressure_relaxation",
+            liquid and numerics.pressure_relaxation > 0.0,
+            relaxation if liquid else "there is no liquid",
+            {"numerics.pressure_relaxation": 0.0},
+        ),
+        Rule(
+            "bulk_viscosity",
+            numerics.bulk_viscosity > 0.0,
+            f"numerics.bulk_viscosity = {numerics.bulk_viscosity:g}",
+            {"numerics.bulk_viscosity": 0.0},
+        ),
+        Rule(
+            "transfer",
+            numerics.transfer,
+            f"numerics.transfer = {numerics.transfer}",
+            {"numerics.transfer": "flip"} if numerics.transfer == "apic" else {"numerics.transfer": "apic"},
+        ),
+    ]
+
+
+def _surface_rules(scenario: Scenario) -> list[Rule]:
+    barrier, ground, domain = scenario.barrier, scenario.ground, scenario.domain
+    if barrier is None:
+        motion, rubs = "none", False
+        why = why_rubs = "there is no barrier"
+    else:
+        motion = {"fixed": "fixed", "sliding": "sliding", "prescribed": "driven"}[barrier.motion.kind]
+        why = f"barrier.motion.kind = {barrier.motion.kind}"
+        greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
+        rubs = greatest > 0.0
+        why_rubs = f"the greatest of barrier.friction is {greatest:g}"
+    slides = barrier is not None and isinstance(barrier.motion, Sliding)
+    surface = "none" if ground is None else "frictional" if ground.friction > 0.0 else "smooth"
+    walls = [name for name in ("left_edge", "right_edge") if getattr(domain, name) == "wall"]
+    return [
+        Rule("barrier", motion, why, {"barrier.motion": {"kind": "fixed"}} if slides else {"barrier": None}),
+        Rule("barrier_friction", rubs, why_rubs, {"barrier.friction": 0.0}),
+        Rule(
+            "ground",
+            surface,
+            "ground = null" if ground is None else f"ground.friction = {ground.friction:g}",
+            {"ground.friction": 0.0} if surface == "frictional" else {},
+        ),
+        Rule(
+            "side_walls",
+            bool(walls),
+            " and ".join(f"domain.{name} = wall" for name in walls) if walls else "both edges of the domain are open",
+            {"domain.left_edge": "open", "domain.right_edge": "open"},
+        ),
+        Rule(
+            "ceiling",
+            domain.top_edge == "wall",
+            f"domain.top_edge = {domain.top_edge}",
+            {"domain.top_edge": "open"},
+        ),
+    ]
+
+
+def without_liquid(scenario: Scenario) -> dict[str, Any]:
+    """Changes that make a two-phase flow undrained, and an undrained one dry; none for a dry one."""
+    flow = scenario.resolved()["flow"]
+    material = flow["material"]
+    if isinstance(scenario.flow, DryFlow):
+        return {}
+    dropped = {
+        "hydraulic_conductivity_m_per_s",
+        "intrinsic_permeability_m2",
+        "liquid_viscosity_Pa_s",
+        "porosity_update",
+    }
+    formulation = "undrained"
+    if not isinstance(scenario.flow, TwoPhaseFlow):
+        dropped = {"liquid_density_kg_per_m3", "liquid_bulk_modulus_Pa", "cavitation_pressure_Pa"}
+        formulation = "dry"
+    kept = {name: value for name, value in material.items() if name not in dropped}
+    return {"flow": flow | {"formulation": formulation, "material": kept}}
+
+
+def _setting(name: str, value: bool) -> str:
+    return f"{name} = {'true' if value else 'false'}"
