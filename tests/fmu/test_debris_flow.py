@@ -143,7 +143,7 @@ def test_states_are_released_in_the_worker(open_unit: Open) -> None:
     host = open_unit("DebrisFlow").initialize(**QUICK)
     states = [host.fmu.getFMUstate() for _ in range(3)]
     (worker,) = (o for o in gc.get_objects() if type(o).__name__ == "WorkerProcess" and o.process_id)
-    kept = [state for state in gc.get_objects() if type(state).__name__ == "WorkerState"]
+    kept = [o for o in gc.get_objects() if type(o).__name__ == "WorkerState" and o.worker is worker]
     keys = [state.key for state in kept]
     assert len(keys) == 3
     del kept
