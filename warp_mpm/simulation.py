@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
+import time
 import os
 import sys
 import tempfile
@@ -382,6 +384,22 @@ class Simulation:
         wp.capture_launch(self._graph)
         if int(self._counters.numpy()[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
+
+    def kernel_times(self, until: float) -> dict[str, float]:
+        """Run to the time `until` [s] with every kernel launched from Python, and tell the wall time [s] of each.
+
+        It is slower than `advance`; the CPU waits for each launch, so that its time is its own.
+        """
+        wp.copy(self._clock, self._array(np.array([until]), wp.float64), dest_offset=at.TARGET, count=1)
+        marks: list[tuple[str, float]] = []
+        self._on_launch = lambda name: marks.append((name, time.perf_counter()))
+        self._interval()
+        self._on_launch = None
+        marks.append(("", time.perf_counter()))
+        spent: dict[str, float] = {}
+        for (name, begin), (_, end) in itertools.pairwise(marks):
+            spent[name] = spent.get(name, 0.0) + end - begin
+        return spent
 
     def _what_diverged(self) -> str:
         """When, which quantity, where, and what to try."""

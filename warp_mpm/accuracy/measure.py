@@ -1,0 +1,105 @@
+"""One run of a study: its key figures, its curves, and where its time went."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from warp_mpm import mechanism
+from warp_mpm.results import Snapshot
+from warp_mpm.scenario import Scenario
+from warp_mpm.summary import impact_figures, moving_mean
+
+CURVES = ("impact_force_x", "flow_kinetic_energy", "barrier_displacement")
+"""Columns of the time series that are kept."""
+
+PROFILED_TIME = 0.02
+"""Simulated time [s] over which the kernels are timed one by one, after the run."""
+
+
+def measure(scenario: Scenario, *, profile: bool = False) -> dict[str, Any]:
+    """Run a scenario without writing anything.
+
+    Times are CPU times of this process, which a machine that is busy with other things does not stretch.
+
+    Args:
+        scenario: what to run.
+        profile: time the kernels too, over a short stretch after the end.
+
+    Returns:
+        Plain JSON values: `status` (finished or diverged), `problem`, `figures`, `curves`, `cpu_time` (of stepping) and
+        its companions [s], `steps`, `material_points`, `kernel_times` (shares of a step).
+    """
+    from warp_mpm.simulation import Simulation, SimulationDiverged
+
+    preparing = time.process_time()
+    simulation = Simulation(scenario)
+    _ = simulation.launched_kernels  # compiles them
+    found: dict[str, Any] = {
+        "status": "finished",
+        "problem": None,
+        "preparation_time": time.process_time() - preparing,
+        "material_points": simulation.material_points,
+    }
+    output = scenario.output
+    count = max(round(output.end_time_s / output.time_series_interval_s), 1)
+    stepping = recording = 0.0
+    samples = [simulation.sample()]
+    wall = time.perf_counter()
+    try:
+        for number in range(1, count + 1):
+            start = time.process_time()
+            simulation.advance(min(number * output.time_series_interval_s, output.end_time_s))
+            half = time.process_time()
+            samples.append(simulation.sample())
+            stepping, recording = stepping + half - start, recording + time.process_time() - half
+    except SimulationDiverged as error:
+        found |= {"status": "diverged", "problem": str(error)}
+    found |= {
+        "cpu_time": stepping,
+        "recording_time": recording,
+        "wall_time": time.perf_counter() - wall,
+        "steps": simulation.steps,
+        "figures": {},
+        "curves": {},
+        "kernel_times": {},
+    }
+    if found["status"] == "finished":
+        series = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+        found["figures"] = _figures(scenario, simulation, series)
+        found["curves"] = {
+            name: [float(f"{value:.7g}") for value in series[name]] for name in ("time", *CURVES) if name in series
+        }
+        if profile:
+            found["kernel_times"] = _kernel_times(simulation)
+    return found
+
+
+def _figures(scenario: Scenario, simulation: Any, series: dict[str, Any]) -> dict[str, float | None]:
+    figures = dict(impact_figures(series["time"], series.get("impact_force_x")))
+    figures["kinetic_energy_lost"] = float(series["flow_kinetic_energy"][0] - series["flow_kinetic_energy"][-1])
+    for name in ("pore_pressure_max", "barrier_velocity"):
+        if name in series:
+            figures[name] = float(series[name].max())
+    moves = scenario.barrier is not None and scenario.barrier.motion.kind == "sliding"
+    figures["barrier_velocity_max"] = figures.pop("barrier_velocity", None) if moves else None
+    figures["barrier_displacement_final"] = float(series["barrier_displacement"][-1]) if moves else None
+    points = simulation.points()
+    shift = simulation.barrier_displacement if scenario.barrier is not None else None
+    snapshot = Snapshot(simulation.time, shift, points.pop("position"), points)
+    return figures | mechanism.deposit(scenario, snapshot)
+
+
+def _kernel_times(simulation: Any) -> dict[str, float]:
+    """Share of each kernel in the time of a step."""
+    simulation.kernel_times(simulation.time + 0.05 * PROFILED_TIME)  # what a first launch sets up is no part of a step
+    spent = simulation.kernel_times(simulation.time + PROFILED_TIME)
+    whole = sum(spent.values())
+    return {name: value / whole for name, value in sorted(spent.items(), key=lambda item: -item[1])}
+
+
+def smoothed_force(curves: dict[str, Any]) -> Any:
+    """Moving mean of the impact force [N/m] of a run's curves."""
+    return moving_mean(np.array(curves["time"]), np.array(curves["impact_force_x"]))
