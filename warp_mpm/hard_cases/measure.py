@@ -132,14 +132,14 @@ def _of_the_series(scenario: Scenario, columns: dict[str, Array]) -> dict[str, f
         gained = float(np.max(-columns.get("barrier_work", np.zeros(1))))
         fallen = float(np.max(columns["flow_gravitational_energy"][0] - columns["flow_gravitational_energy"]))
         figures["energy_error"] = created * start / (start + max(gained, 0.0) + max(fallen, 0.0))
-    fastest = float(columns["speed_max"].max())
-    figures |= {"speed_max": fastest, "speed_ratio": fastest / max(speed_bound(scenario), 1e-9)}
+    fastest, bound = float(columns["speed_max"].max()), speed_bound(scenario)
+    figures |= {"speed_max": fastest, "speed_ratio": fastest / bound if bound > 0.0 else fastest}
     if "pore_pressure_max_anywhere" in columns:
         material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
         still = material.density * scenario.gravity.acceleration_m_per_s2 * depth
         hammer = material.density * step_limits(scenario).sound_speed * fastest
         greatest = float(columns["pore_pressure_max_anywhere"].max())
-        figures |= {"pore_pressure_max": greatest, "pressure_ratio": greatest / (hammer + still)}
+        figures |= {"pore_pressure_max": greatest, "pressure_ratio": greatest / max(hammer + still, 1.0)}
     impact = impact_figures(columns["time"], columns.get("impact_force_x"))
     if impact["peak_force_filtered"] is not None:
         figures["peak_force_filtered"] = impact["peak_force_filtered"]

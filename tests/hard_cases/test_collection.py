@@ -1,0 +1,62 @@
+"""The collection of hard scenes: a dozen of the worst by default, all of them, at half the time step too, when slow."""
+
+import pytest
+
+from warp_mpm.hard_cases.collection import LARGE, hard_cases
+from warp_mpm.hard_cases.criteria import CRITERIA
+from warp_mpm.hard_cases.measure import measure
+from warp_mpm.hard_cases.safeguards import KNOWN_FAILURES
+
+WORST = (
+    "barrier_leaves",
+    "barrier_light",
+    "bulk_modulus_2e9",
+    "conductivity_1e-9",
+    "courant_0.99",
+    "falling_jet",
+    "friction_angle_0",
+    "odd_spacing",
+    "one_point",
+    "porosity_0.05",
+    "speed_50",
+    "thin_flow",
+    "young_modulus_1e5",
+)
+
+
+def failed(case, measured):
+    assert measured.problem is None, measured.problem
+    return {criterion.figure: value for criterion, value in measured.failures(case.scenario)}
+
+
+@pytest.mark.parametrize("name", WORST)
+def test_the_worst(name):
+    (case,) = hard_cases([name])
+    unmet = failed(case, measure(case.scenario))
+    assert unmet.keys() <= KNOWN_FAILURES.get(name, frozenset()), unmet
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", hard_cases(), ids=lambda case: case.name)
+def test_all_at_half_the_time_step_too(case):
+    unmet = failed(case, measure(case.scenario, halve=case.name not in LARGE))
+    assert unmet.keys() == KNOWN_FAILURES.get(case.name, frozenset()), unmet
+
+
+def test_every_case_says_why_it_is_hard():
+    cases = hard_cases()
+    assert len(cases) > 50
+    assert all(20 < len(case.reason) < 140 and case.reason.endswith(".") for case in cases)
+    assert len({case.scenario.title for case in cases}) == len(cases)
+    assert KNOWN_FAILURES.keys() <= {case.name for case in cases}
+
+
+def test_criteria_catch_what_they_name():
+    """A run that is spoilt on purpose fails by the figure that belongs to it."""
+    (case,) = hard_cases(["one_point"])
+    good = measure(case.scenario)
+    for criterion in CRITERIA:
+        if criterion.figure in good.figures:
+            for bad in (criterion.limit_for(case.scenario) * 1.01 + 1e-6, float("nan"), float("inf")):
+                spoilt = type(good)(good.figures | {criterion.figure: bad})
+                assert [found.figure for found, _ in spoilt.failures(case.scenario)] == [criterion.figure]

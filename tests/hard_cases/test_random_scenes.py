@@ -1,0 +1,116 @@
+"""Scenes drawn at random from wide but legal ranges: none may be unstable. Each failure found becomes a named case."""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+
+from warp_mpm.hard_cases.measure import measure
+from warp_mpm.scenario import Scenario
+
+BASE = Scenario.load(Path(__file__).parents[2] / "scenarios" / "case_1.json")
+
+
+def logarithmic(low, high):
+    """Powers of ten between two exponents."""
+    return st.floats(low, high).map(lambda exponent: float(10.0**exponent))
+
+
+def scenes(formulations, precisions, transfers):
+    @st.composite
+    def draw_scene(draw):
+        pick = partial(st.floats, allow_nan=False, allow_infinity=False)
+        formulation = draw(st.sampled_from(formulations))
+        friction_angle = draw(pick(0.0, 45.0))
+        cohesion = draw(st.one_of(st.just(0.0), logarithmic(2, 5)))
+        depth = draw(pick(1.0, 4.0))
+        height = draw(pick(0.5, 8.0))
+        data = BASE.resolved()
+        flow, material = data["flow"], data["flow"]["material"]
+        flow["formulation"] = formulation
+        flow["shape"] = {
+            "kind": "front_and_tail",
+            "depth_m": depth,
+            "squares": draw(st.integers(0, 4)),
+            "distance_m": draw(pick(0.0, 3.0)),
+        }
+        flow["velocity_m_per_s"] = [draw(pick(-5.0, 50.0)), draw(pick(-5.0, 5.0))]
+        flow["lateral_stress_coefficient"] = None
+        flow["initial_stress"] = draw(st.sampled_from(["geostatic", "zero"]))
+        material |= {
+            "porosity": draw(pick(0.05, 0.9)),
+            "young_modulus_Pa": draw(logarithmic(5, 8.3)),
+            "poisson_ratio": draw(pick(0.0, 0.45)),
+            "friction_angle_deg": friction_angle,
+            "dilatancy_angle_deg": draw(pick(0.0, 0.3)) * friction_angle,
+            "cohesion_Pa": cohesion,
+            "tension_cutoff_Pa": draw(st.sampled_from([0.0, 0.5])) * cohesion,
+        }
+        wet = ["liquid_density_kg_per_m3", "liquid_bulk_modulus_Pa", "cavitation_pressure_Pa"]
+        drained = ["hydraulic_conductivity_m_per_s", "intrinsic_permeability_m2", "liquid_viscosity_Pa_s"]
+        if formulation == "two_phase":
+            material["hydraulic_conductivity_m_per_s"] = draw(logarithmic(-9, 1))
+        if formulation != "dry":
+            material["liquid_bulk_modulus_Pa"] = draw(logarithmic(6, 8.5))
+        for name in [*drained, "porosity_update"] * (formulation != "two_phase") + wet * (formulation == "dry"):
+            material.pop(name, None)
+        volume = (2 + flow["shape"]["squares"]) * depth**2
+        data["barrier"] = {
+            "shape": {
+                "kind": "trapezoid",
+                "crest_width_m": draw(pick(0.0, 5.0)),
+                "height_m": height,
+                "face_angle_deg": draw(st.one_of(pick(20.0, 90.0), st.just(90.0))),
+            },
+            "motion": {
+                "kind": "sliding",
+                "mass_kg_per_m": 1800.0 * volume * draw(logarithmic(-3, 6)),
+                "base_friction": draw(pick(0.0, 1.0)),
+            },
+            "friction": draw(pick(0.01, 1.0)),
+        }
+        data["ground"] = {"friction": draw(pick(0.01, 1.0))}
+        data["gravity"] = {"acceleration_m_per_s2": draw(pick(0.0, 20.0)), "tilt_deg": draw(pick(-20.0, 30.0))}
+        data["numerics"] |= {
+            "spacing_m": draw(pick(0.3, 0.8)),
+            "points_per_cell": draw(st.sampled_from([1, 4, 9])),
+            "courant_number": draw(pick(0.3, 0.99)),
+            "precision": draw(st.sampled_from(precisions)),
+            "transfer": draw(st.sampled_from(transfers)),
+        }
+        data["output"] = {"end_time_s": 1.0, "time_series_interval_s": 0.01, "snapshot_interval_s": 0.05}
+        return data
+
+    return draw_scene()
+
+
+def assert_stable(data):
+    scenario = Scenario.model_validate(data)
+    measured = measure(scenario)
+    note(scenario.model_dump_json())
+    assert measured.problem is None, measured.problem
+    unmet = {criterion.figure: value for criterion, value in measured.failures(scenario)}
+    # How deep a point lies in a steep face and how noisy a pressure is on three cells are no matters of stability; and
+    # a soft skeleton of little porosity is pressed beyond its voids by a load, as the linear law has it.
+    lenient = ("pressure_noise", "penetration", "porosity_low")
+    unmet = {name: value for name, value in unmet.items() if name not in lenient}
+    assert not unmet
+    assert measured.figures["penetration"] < 1.0
+
+
+QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large]
+
+
+@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=QUIET)
+@given(scenes(["two_phase"], ["float64"], ["apic"]))
+def test_random_scenes(data):
+    assert_stable(data)
+
+
+@pytest.mark.slow
+@settings(max_examples=300, deadline=None, suppress_health_check=QUIET)
+@given(scenes(["two_phase", "undrained", "dry"], ["float64", "float32"], ["apic", "flip"]))
+def test_many_random_scenes(data):
+    assert_stable(data)
