@@ -40,8 +40,8 @@ def relative_velocity(simulation):
 
 @pytest.mark.parametrize(("drag", "sign"), [("semi_implicit", 1.0), ("explicit", -1.0)])
 def test_relative_velocity_decays_at_the_rate_of_darcys_law(load_scene, drag, sign):
-    """First order in the step, from above if implicit, from below if explicit; both to the exact exponential. Inside the
-    block the phases push on each other too, but over the whole block these forces cancel."""
+    """First order in the step, from above if implicit, from below if explicit; both to the exact exponential. Inside
+    the block the phases push on each other too, but over the whole block these forces cancel."""
     exact = np.array([1.0, -0.5]) * np.exp(-RATE * DURATION)
     errors = []
     for courant_number in (0.8, 0.4, 0.2):
@@ -54,6 +54,16 @@ def test_relative_velocity_decays_at_the_rate_of_darcys_law(load_scene, drag, si
     np.testing.assert_allclose(errors[1:] / errors[:-1], 0.5, atol=np.abs(errors[0]).max())
     # Next to nothing remains when both extremes are extrapolated to a step of zero.
     assert np.abs(2.0 * errors[2] - errors[1]).max() < 0.02
+
+
+def test_factor_of_one_step(load_scene):
+    """1 / (1 + r dt) if implicit, 1 - r dt if explicit, for the phases as a whole and whatever else they do."""
+    step = 1e-3
+    for drag, factor in (("semi_implicit", 1.0 / (1.0 + RATE * step)), ("explicit", 1.0 - RATE * step)):
+        simulation = flying_block(load_scene, drag, 0.95)
+        simulation.advance(step)
+        assert simulation.steps == 1
+        np.testing.assert_allclose(relative_velocity(simulation), factor * np.array([1.0, -0.5]), rtol=1e-11)
 
 
 def test_both_ways_agree_as_the_step_goes_to_zero(load_scene):

@@ -26,7 +26,7 @@ def history(simulation, until=1.0):
 
 @pytest.mark.parametrize("mass", [81.0, 72_000.0])
 def test_momentum_of_the_barrier_is_what_flow_and_base_gave_it(load_scene, mass):
-    """Also for a barrier of a thousandth of the flow's mass, which an explicit coupling would throw out of the scene."""
+    """Also for a barrier of a thousandth of the flow's mass, which an explicit coupling would throw out of sight."""
     friction = 0.29
     simulation = Simulation(scene(load_scene, motion={"mass_kg_per_m": mass, "base_friction": friction}))
     told = history(simulation)
@@ -49,8 +49,8 @@ def test_momentum_of_the_barrier_is_what_flow_and_base_gave_it(load_scene, mass)
 
 
 def test_a_light_barrier_goes_with_the_flow(load_scene):
-    """A thousandth of the flow's mass on a smooth base does not hold it up. It takes the speed of the flow's fastest part,
-    which on an inclined face is more the steeper that part comes down: v_x - v_y cot(beta) <= |v| / sin(beta)."""
+    """A thousandth of the flow's mass on a smooth base does not hold it up. It takes the speed of the flow's fastest
+    part, which on an inclined face is more the steeper that comes down: v_x - v_y cot(beta) <= |v| / sin(beta)."""
     simulation = Simulation(scene(load_scene, motion={"mass_kg_per_m": 81.0, "base_friction": 0.0}))
     told = history(simulation)
     mean = told["momentum_x"] / 81_000.0

@@ -94,7 +94,7 @@ class Bench:
         )
 
     def internal_force(self):
-        """Force [columns, rows, 2 phases] on the nodes [N/m], of the total stress of each phase (audit, section 3.4)."""
+        """Force [columns, rows, 2 phases] on the nodes [N/m], of each phase's total stress (audit, section 3.4)."""
         n = self.material.porosity if self.two_phase else 0.0
         pressure = self.pressure + self.viscous
         xx, yy, _, xy = self.stress.T

@@ -40,8 +40,8 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
     FRICTION = effects.friction
-    BARRIER_FRICTION = effects.barrier_friction
-    GROUND_FRICTION = effects.ground == "frictional"
+    BARRIER_CARRIED = effects.barrier_friction and LIQUID
+    GROUND_CARRIED = effects.ground == "frictional" and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     PORE_FORCE = effects.effective_contact_force
 
@@ -174,7 +174,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
         if mass > F(0.0):
             velocity = grid.velocity[i, j]
             liquid_free = V2()
-            if GROUND_FRICTION:
+            if GROUND_CARRIED:
                 liquid_free = liquid_alone(grid, parameters, i, j, time_step)
             pair = wp.bool(False)
             if mi != i or mj != j:
@@ -185,7 +185,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                     if leaves(velocity, normal, V2(), parameters) or not leaves(mean, normal, V2(), parameters):
                         pair = wp.bool(True)
                         both = F(4.0) * mass * other / (mass + other)
-                        if GROUND_FRICTION:
+                        if GROUND_CARRIED:
                             liquid_free = F(0.5) * (liquid_free + liquid_alone(grid, parameters, mi, mj, time_step))
                         change = respond(both, mean, liquid_free, normal, friction, V2(), parameters, time_step)
                         add(grid, i, j, change * (F(0.5) * both / mass))
@@ -300,7 +300,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             if mass > F(0.0):
                 velocity = grid.velocity[node[0], node[1]]
                 liquid_free = V2()
-                if BARRIER_FRICTION:
+                if BARRIER_CARRIED:
                     liquid_free = liquid_alone(grid, parameters, node[0], node[1], time_step)
                 pair = wp.int32(0)
                 if mirror[0] >= 0:
@@ -313,13 +313,14 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                             pair = wp.int32(1)
                             mass = F(4.0) * mass * other / (mass + other)
                             velocity = mean
-                            if BARRIER_FRICTION:
+                            if BARRIER_CARRIED:
                                 liquid_free = F(0.5) * (
                                     liquid_free + liquid_alone(grid, parameters, mirror[0], mirror[1], time_step)
                                 )
                 contact.pair[e] = pair
                 contact.velocity[e] = velocity
-                contact.liquid_free[e] = liquid_free
+                if BARRIER_CARRIED:
+                    contact.liquid_free[e] = liquid_free
             contact.mass[e] = mass
 
         @wp.kernel(module=module)
@@ -337,10 +338,13 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                 surface_velocity = V2(F(clock[wp.static(BARRIER_VELOCITY)]), F(0.0))
                 node = contact.node[e]
                 mirror = contact.mirror[e]
+                liquid_free = V2()
+                if BARRIER_CARRIED:
+                    liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],
-                    contact.liquid_free[e],
+                    liquid_free,
                     contact.normal[e],
                     contact.friction[e],
                     surface_velocity,

@@ -249,8 +249,9 @@ def layout(effects: Effects) -> SimpleNamespace:
         "pair": array(dtype=wp.int32),  # 1: acts with its mirror image
         "mass": array(dtype=scalar),
         "velocity": array(dtype=V),
-        "liquid_free": array(dtype=V2),
     }
+    if effects.barrier_friction and effects.liquid:
+        contact["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
 
     return SimpleNamespace(
         effects=effects,

@@ -36,6 +36,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     Parameters = types.Parameters
     respond = contact.respond
     impulse = contact.impulse
+    CARRIED = types.effects.barrier_friction and types.effects.liquid
 
     @wp.func
     def flow_impulse(
@@ -46,10 +47,13 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
         for e in range(count):
             mass = contact.mass[e]
             if mass > F(0.0):
+                liquid_free = V2()
+                if CARRIED:
+                    liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],
-                    contact.liquid_free[e],
+                    liquid_free,
                     contact.normal[e],
                     contact.friction[e],
                     surface_velocity,

@@ -1,0 +1,215 @@
+"""Only what a scene calls for: kernels launched, arrays held and code generated, seen from outside, in every shipped
+scene; and an effect without influence is the same as none."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_mpm.effect_rules import effect_rules
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation, derive_effects
+from warp_mpm.time_step import step_limits
+
+SCENES = Path(__file__).parents[2] / "scenarios"
+SHIPPED = sorted(path.stem for path in SCENES.glob("*.json"))
+
+TRANSPORT = ["clear", "forget", "scatter", "move"]
+BARRIERS = {"sliding": ["collect", "slide", "barrier"], "fixed": ["collect", "barrier"]}
+
+POINT_NUMBERS = {
+    "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
+            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1},
+}  # fmt: skip
+POINT_NUMBERS["undrained"] = POINT_NUMBERS["dry"] | {"liquid_strain": 1, "pressure_residual": 1}
+POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
+    "velocity": 4, "affine_x": 4, "affine_y": 4, "liquid_divergence": 1,
+}  # fmt: skip
+"""Floating-point numbers that a material point holds, by formulation."""
+
+NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2 + 1, "undrained": 1 + 2 + 2 + 4 + 1 + 2, "two_phase": 1 + 4 + 4 + 5 + 1}
+"""And a node: mass, momentum, velocity, corner sums, corner room; undrained friction needs the water's own share."""
+
+LIQUID_WORDS = ("liquid", "pore", "pressure_residual", "drag", "surrounded", "cavitation", "relaxation")
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    """Names of the kernels launched, and the arrays allocated, noted at Warp's own door."""
+    noted = {"launched": [], "allocated": []}
+    launch, zeros = wp.launch, wp.zeros
+
+    def noting_launch(kernel, *arguments, **named):
+        noted["launched"].append(kernel.key.split("__")[-1])
+        return launch(kernel, *arguments, **named)
+
+    def noting(make):
+        def made(*arguments, **named):
+            result = make(*arguments, **named)
+            if getattr(result, "ptr", None):
+                noted["allocated"].append(result)
+            return result
+
+        return made
+
+    monkeypatch.setattr(wp, "launch", noting_launch)
+    monkeypatch.setattr(wp, "zeros", noting(zeros))
+    return noted
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
+    noted = watched
+    scenario = load_scene(name, **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.01})
+    flow = scenario.flow
+    simulation = Simulation(scenario)
+    simulation.advance(1e-4)
+    # The shipped scenes are plastic, on smooth ground, with smoothing; they differ in flow and barrier.
+    step = [*TRANSPORT, "ground", *BARRIERS[scenario.barrier.motion.kind], "gather", "average", "update", "plasticity"]
+    assert noted["launched"] == ["start", *step, "tick"]
+    assert simulation.launched_kernels == (*step, "tick")
+
+    arrays, number = simulation.arrays, simulation.material_points
+    for field, count in POINT_NUMBERS[flow.formulation].items():
+        assert arrays[f"points.{field}"] == 8 * count * number
+    # Beside numbers a point holds only whole ones: whether it is inside, and with liquid whether it is surrounded.
+    others = {name for name in arrays if name.startswith("points.")}
+    others -= {f"points.{field}" for field in POINT_NUMBERS[flow.formulation]}
+    assert others <= {"points.inside", "points.surrounded"}
+    assert all(arrays[name] == 4 * number for name in others)
+    nodes = simulation.grid.columns * simulation.grid.rows
+    doubles = sum(size for name, size in arrays.items() if name.startswith("grid.") and size >= 8 * nodes)
+    assert doubles == 8 * nodes * NODE_NUMBERS[flow.formulation]
+    # Nothing is allocated that is not listed.
+    assert {array.capacity for array in noted["allocated"]} <= set(arrays.values())
+    if flow.formulation == "dry":
+        assert not [name for name in arrays if any(word in name for word in LIQUID_WORDS)]
+
+
+def test_memory_is_at_most_600_bytes_a_point(load_scene):
+    """At the paper's spacing; the grid, most of which is empty, is another matter and told apart by `plan`."""
+    simulation = Simulation(load_scene("case_1"))
+    per_point = sum(size for name, size in simulation.arrays.items() if name.startswith("points."))
+    assert per_point / simulation.material_points < 600.0
+
+
+def generated_code(scenario):
+    """What Warp generated for the scene's kernels, without the comments that repeat the Python source."""
+    simulation = Simulation(scenario)
+    simulation.advance(1e-4)
+    module = wp.get_module(simulation.effects.module_name)
+    folder = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(block_dim=1)  # the CPU's
+    text = next(folder.glob("*.cpp")).read_text()
+    return re.sub(r"^\s*//.*$", "", text, flags=re.MULTILINE)
+
+
+def test_generated_code_of_a_dry_scene_holds_no_liquid(load_scene):
+    changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01}
+    dry = generated_code(load_scene("case_1_dry", **changes))
+    words = set(re.findall(r"[A-Za-z_]\w*", dry))
+    found = {word for word in words if any(part in word for part in LIQUID_WORDS)}
+    # An argument that one function hands on; in a dry scene it is the constant zero and nothing reads it.
+    assert found <= {"var_liquid_free", "adj_liquid_free"}
+    assert len(re.findall(r"\bvar_liquid_free\b", dry)) <= 2  # in signatures, never in a statement
+    # The same search does find them where there is a liquid.
+    wet = generated_code(load_scene("case_1", **changes))
+    assert {"liquid_strain", "var_drag", "liquid_bulk_modulus"} & set(re.findall(r"[A-Za-z_]\w*", wet))
+
+
+def test_generated_code_of_a_fixed_barrier_does_not_slide(load_scene):
+    changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01}
+    assert "barrier_mass" not in generated_code(load_scene("case_1_fixed", **changes))
+    assert "barrier_mass" in generated_code(load_scene("case_1", **changes))
+
+
+def test_a_domain_ten_times_as_large_holds_no_more_blocks_in_use(load_scene):
+    counts = []
+    for scale in (1.0, 10.0):
+        changes = {
+            "numerics.spacing_m": 0.5, "domain.left_m": -30.0 * scale, "domain.right_m": 30.0 * scale,
+            "domain.top_m": 10.0,
+        }  # fmt: skip
+        simulation = Simulation(load_scene("case_1", **changes))
+        simulation.advance(0.2)
+        counts.append(int(simulation._grid_arrays["active_count"].numpy()[0]))
+    # One column of blocks more where the blocks of the two grids start at different places.
+    assert abs(counts[1] - counts[0]) <= 2
+    assert counts[0] > 10
+
+
+def test_every_rule_names_an_effect_and_gives_a_reason():
+    for name in SHIPPED:
+        scenario = Scenario.load(SCENES / f"{name}.json")
+        rules = effect_rules(scenario)
+        effects = derive_effects(scenario)
+        assert {rule.effect for rule in rules} == set(effects.__dataclass_fields__)
+        assert all(rule.reason and getattr(effects, rule.effect) == rule.value for rule in rules)
+        for rule in rules:
+            if rule.on and rule.switched:
+                switched = derive_effects(scenario.replaced(rule.switched))
+                assert getattr(switched, rule.effect) != rule.value
+
+
+def forces_and_positions(scenario, until=1.0):
+    simulation = Simulation(scenario)
+    forces = []
+    for time in 0.05 * np.arange(1, round(until / 0.05) + 1):
+        simulation.advance(time)
+        forces.append(simulation.sample()["impact_force_x"])
+    return np.array(forces), simulation.points()["position"]
+
+
+def assert_equal_runs(first, second, tolerance):
+    peak = np.abs(first[0]).max()
+    assert peak > 1e5  # the flow did meet the barrier
+    np.testing.assert_allclose(second[0], first[0], atol=tolerance * peak)
+    np.testing.assert_allclose(second[1], first[1], atol=tolerance)
+
+
+COARSE = {"numerics.spacing_m": 0.5, "output.end_time_s": 1.0}
+WITHOUT_INFLUENCE = {
+    "yield stress far beyond reach": (
+        "case_1_dry",
+        {"flow.material.cohesion_Pa": 1e12, "flow.material.tension_cutoff_Pa": 1e12},
+        {"flow.material.plasticity": False},
+    ),
+    "walls and ceiling far away": (
+        "case_1_dry",
+        {"domain.left_edge": "wall", "domain.right_edge": "wall", "domain.top_edge": "wall"},
+        {},
+    ),
+    "ground friction of next to nothing": ("case_1", {"ground.friction": 1e-13}, {}),
+}
+
+
+@pytest.mark.parametrize(("name", "present", "absent"), WITHOUT_INFLUENCE.values(), ids=WITHOUT_INFLUENCE)
+def test_an_effect_without_influence_is_the_same_as_none(load_scene, name, present, absent):
+    scenes = [load_scene(name, **COARSE | changes) for changes in (present, absent)]
+    assert derive_effects(scenes[0]) != derive_effects(scenes[1])
+    # Other kernels round otherwise; a flow that splashes amplifies that, over a second by some thousand times.
+    assert_equal_runs(forces_and_positions(scenes[1]), forces_and_positions(scenes[0]), 1e-9)
+
+
+def test_endless_drag_is_undrained(load_scene):
+    """Two phases that cannot part are one: the same material, drag some 1e11 times the scene's.
+
+    Of two phases sound runs faster as long as drag is left out of account. What is set as a share of its speed is
+    scaled to be the same, and so is the step, by advancing one at a time.
+    """
+    one = load_scene("case_1_undrained", **COARSE)
+    two = load_scene("case_1", **COARSE | {"flow.material.hydraulic_conductivity_m_per_s": 1e-15})
+    ratio = step_limits(one).sound_speed / step_limits(two).sound_speed
+    names = ("bulk_viscosity", "pressure_relaxation")
+    scaled = {f"numerics.{name}": getattr(one.numerics, name) * ratio for name in names}
+    runs = []
+    for scenario in (one, two.replaced(scaled)):
+        simulation, forces, step = Simulation(scenario), [], 1e-3
+        for count in range(1, 801):
+            simulation.advance(count * step)
+            if count % 10 == 0:
+                forces.append(simulation.sample()["impact_force_x"])
+        assert simulation.steps == 800
+        runs.append((np.array(forces), simulation.points()["position"]))
+    assert_equal_runs(*runs, 1e-9)
