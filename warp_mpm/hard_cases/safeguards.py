@@ -40,7 +40,8 @@ SAFEGUARDS = (
     Safeguard(
         "implicit barrier",
         "the barrier's velocity and the flow's reaction are found together",
-        "`barrier_light`: moved by the force of the interval before, it swings with growing amplitude",
+        "`resting` with a barrier of 1 kg/m: moved by the force of the step before, it is shot off at over 50 m/s; "
+        "found together, it starts at less than 0.5 m/s",
     ),
     Safeguard(
         "divergence check",
@@ -61,8 +62,8 @@ KNOWN_LIMITS = (
     "when the time step is halved, 2 % and 8 % at four cells: the transfer dissipates per step, less on finer grids.",
     "Where a jet lands, single points meet the ground at up to a fifth of their water hammer for a few milliseconds. "
     "The figure `pore_pressure_max` of a run leaves them out, `pore_pressure_max_anywhere` holds them.",
-    "The skeleton's stiffness is linear: a soft one of little porosity (0.05, below 1 MPa) is pressed beyond its voids by "
-    "an impact, porosity by volume below zero. The run stays stable, the material law has no answer.",
+    "The skeleton's stiffness is linear: a soft one of little porosity (0.05, below 1 MPa) is pressed beyond its voids "
+    "by an impact, porosity by volume below zero. The run stays stable, the material law has no answer.",
     "A dry flow onto a wet deposit cannot be stated: a scene holds one material.",
     "Bit-for-bit continuation is promised on the processor only: on a GPU sums have no fixed order.",
 )

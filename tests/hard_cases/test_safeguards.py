@@ -1,0 +1,104 @@
+"""Each safeguard switched off, and the scene that then fails. One that nothing needs would be removed."""
+
+import dataclasses
+
+import numpy as np
+
+from warp_mpm.hard_cases.collection import hard_cases
+from warp_mpm.hard_cases.measure import measure
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+from warp_mpm.time_step import step_limits
+
+
+def scene(name, changes=None):
+    (case,) = hard_cases([name])
+    return case.scenario.replaced(changes or {})
+
+
+def test_volumetric_smoothing():
+    """Without it the stiffest liquid locks: pressures differ within a cell by half of what they are."""
+    with_it = measure(scene("bulk_modulus_2e9"))
+    without = measure(scene("bulk_modulus_2e9", {"numerics.volumetric_smoothing": False}))
+    assert with_it.failures(scene("bulk_modulus_2e9")) == []
+    assert [criterion.figure for criterion, _ in without.failures(scene("bulk_modulus_2e9"))] == ["pressure_noise"]
+
+
+def test_pressure_relaxation():
+    with_it = measure(scene("face_90")).figures["pressure_noise"]
+    without = measure(scene("face_90", {"numerics.pressure_relaxation": 0.0})).figures["pressure_noise"]
+    assert with_it < 0.08
+    assert without > 1.5 * with_it
+
+
+def overshoot(bulk_viscosity):
+    """Greatest pressure behind the front of sound in a column stopped at its base, over the pressure on the plateau.
+
+    Undrained and elastic between smooth walls: wave theory has one step of pressure that travels up the column.
+    """
+    data = scene("undrained_20").resolved()
+    height, speed = 8.0, 0.1
+    outline = [[-0.4, 0.0], [0.0, 0.0], [0.0, height], [-0.4, height]]
+    data["flow"] |= {
+        "shape": {"kind": "polygon", "vertices_m": outline},
+        "velocity_m_per_s": [0.0, -speed],
+        "initial_stress": "zero",
+        "lateral_stress_coefficient": None,
+    }
+    data["flow"]["material"]["plasticity"] = False
+    data |= {
+        "barrier": None,
+        "gravity": {"acceleration_m_per_s2": 0.0},
+        "domain": {"left_edge": "wall", "right_edge": "wall", "left_m": -0.4, "right_m": 0.0},
+    }
+    data["numerics"] |= {"spacing_m": 0.1, "bulk_viscosity": bulk_viscosity}
+    scenario = Scenario.model_validate(data)
+    simulation = Simulation(scenario)
+    simulation.advance(0.6 * height / step_limits(scenario).sound_speed)
+    points = simulation.points()
+    # The plateau near the base, where the front passed long ago.
+    plateau = points["pore_pressure"][points["position"][:, 1] < 0.2 * height].mean()
+    return points["pore_pressure"].max() / plateau - 1.0
+
+
+def test_bulk_viscosity():
+    assert overshoot(0.2) < 0.10
+    assert overshoot(0.0) > 0.15
+
+
+class ExplicitDrag(Simulation):
+    """Explicit drag at the time step of the implicit one."""
+
+    def _make_parameters(self):
+        self._limits = dataclasses.replace(self._limits, drag_step=np.inf)
+        return super()._make_parameters()
+
+
+def test_implicit_drag():
+    assert measure(scene("conductivity_1e-9")).problem is None
+    explicit = scene("conductivity_1e-9", {"numerics.drag": "explicit"})
+    assert "diverged" in measure(explicit, make_simulation=ExplicitDrag).problem
+    limits = step_limits(explicit)
+    assert explicit.numerics.spacing_m / limits.wave_speed > 1e4 * limits.drag_step
+
+
+def test_implicit_barrier():
+    """A light barrier in front of a flow at rest: moved by the force of a step in which it stood, it is shot off."""
+    interval = 0.001  # one step
+    motion = {"kind": "sliding", "mass_kg_per_m": 1.0, "base_friction": 0.0}
+    together = Simulation(scene("resting", {"barrier.motion": motion}))
+    together.advance(interval)
+    still = Simulation(scene("resting", {"barrier.motion": {"kind": "fixed"}}))
+    still.advance(interval)
+    forces = still.sample()
+    pushed = (forces["impact_force_x"] + forces["top_force_x"] + forces["back_force_x"]) * interval / 1.0
+    assert 0.0 < together.barrier_velocity < 0.5
+    assert pushed > 50.0
+
+
+def test_a_lone_barrier_mass_of_any_size_converges():
+    """The iteration that finds the barrier's velocity never ends without its answer."""
+    for name in ("barrier_light", "barrier_heavy", "friction_1"):
+        simulation = Simulation(scene(name))
+        simulation.advance(1.0)
+        assert simulation.record["barrier_unconverged"] == 0
