@@ -1,6 +1,7 @@
 """End of the step at the material points: strains, effective stress, pore pressure, position ("update stress last")."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -21,34 +22,11 @@ from .layout import (
 from .mohr_coulomb import make_return_mapping
 
 
-def make_constitutive(
-    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
-) -> SimpleNamespace:
-    """Build the kernels `update` and, if called for, `plasticity` (over points)."""
-    effects = types.effects
+def make_trial_stress(types: SimpleNamespace) -> Any:
+    """Build the function `trial_stress`, the elastic part of the constitutive law."""
     F = types.scalar
-    V2 = types.V2
     V4 = types.V4
-    S = types.S
-    Points = types.Points
-    Grid = types.Grid
     Parameters = types.Parameters
-    hats = shapes.hats
-    pressure_at = pore.pressure
-    porosity = pore.porosity
-
-    TWO_PHASE = effects.two_phase
-    LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
-    PLASTICITY = effects.plasticity
-    GROUND = effects.ground != "none"
-    BARRIER = effects.barrier != "none"
-    CORNERS = effects.smoothing_grid
-    SMOOTHING = effects.volumetric_smoothing
-    RELAXATION = effects.pressure_relaxation
-    VISCOSITY = effects.bulk_viscosity
-    MOVING = effects.barrier in ("sliding", "driven")
-    GAP_BOUND = effects.gap_record and effects.smoothing_grid
 
     @wp.func
     def trial_stress(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
@@ -86,6 +64,39 @@ def make_constitutive(
         )
         squares = (xx - third) * (xx - third) + (yy - third) * (yy - third) + third * third + F(2.0) * xy * xy
         return trial, wp.sqrt(F(2.0 / 3.0) * squares)
+
+    return trial_stress
+
+
+def make_constitutive(
+    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
+) -> SimpleNamespace:
+    """Build the kernels `update` and, if called for, `plasticity` (over points)."""
+    effects = types.effects
+    F = types.scalar
+    V2 = types.V2
+    S = types.S
+    Points = types.Points
+    Grid = types.Grid
+    Parameters = types.Parameters
+    hats = shapes.hats
+    pressure_at = pore.pressure
+    porosity = pore.porosity
+
+    TWO_PHASE = effects.two_phase
+    LIQUID = effects.liquid
+    FLIP = effects.transfer == "flip"
+    PLASTICITY = effects.plasticity
+    GROUND = effects.ground != "none"
+    BARRIER = effects.barrier != "none"
+    CORNERS = effects.smoothing_grid
+    SMOOTHING = effects.volumetric_smoothing
+    RELAXATION = effects.pressure_relaxation
+    VISCOSITY = effects.bulk_viscosity
+    MOVING = effects.barrier in ("sliding", "driven")
+    GAP_BOUND = effects.gap_record and effects.smoothing_grid
+
+    trial_stress = make_trial_stress(types)
 
     @wp.func
     def room(filling: F) -> F:
