@@ -30,6 +30,18 @@ BASE_STRENGTH_RATIO = 0.8
 LARGEST_SCENE = 20_000_000
 """Most material points that a scenario may ask for."""
 
+LARGEST_GRID = 100_000_000
+"""Most nodes of the grid between edges that a scenario may ask for."""
+
+BYTES_PER_NODE = 120
+"""Rough memory of one node of the grid in a two-phase run."""
+
+LARGEST_SNAPSHOTS = 1e12
+"""Most bytes of snapshots that a scenario may ask for."""
+
+BYTES_PER_SNAPSHOT_POINT = 110
+"""Size on the disk of one material point in a snapshot."""
+
 BYTES_PER_POINT = 500
 """Rough memory of one material point in a two-phase run, grid and output included."""
 
@@ -620,8 +632,9 @@ class Scenario(_Model):
                 )
         return problems
 
-    def _impossible_domain(self) -> list[str]:
-        domain, outline = self.domain, self.flow.polygon
+    def _extent(self) -> tuple[float, float, float, float]:
+        """Smallest and greatest x, smallest and greatest y [m] of flow and barrier."""
+        outline = self.flow.polygon
         x_low, y_low = outline.min(axis=0)
         x_high, y_high = outline.max(axis=0)
         if self.barrier is not None:
@@ -631,6 +644,11 @@ class Scenario(_Model):
                 x_high, y_high = max(x_high, base), max(y_high, height)
             else:
                 x_high = max(x_high, 0.0)
+        return float(x_low), float(x_high), float(y_low), float(y_high)
+
+    def _impossible_domain(self) -> list[str]:
+        domain = self.domain
+        x_low, x_high, y_low, y_high = self._extent()
         problems = []
         if domain.left_m is not None and domain.left_m > x_low:
             problems.append(f"domain.left_m = {domain.left_m:g} cuts the scene; it must be at most {x_low:g}")
@@ -657,6 +675,27 @@ class Scenario(_Model):
             problems.append(
                 f"numerics.spacing_m = {self.numerics.spacing_m:g} leaves less than one material point for the flow "
                 f"of {self.flow.volume:.3g} m²; it must be smaller"
+            )
+        domain = self.domain
+        x_low, x_high, y_low, y_high = self._extent()
+        given = (domain.left_m, domain.right_m, domain.bottom_m, domain.top_m)
+        left, right, low, high = (
+            asked if asked is not None else fitted
+            for asked, fitted in zip(given, (x_low, x_high, y_low, y_high), strict=True)
+        )
+        low = 0.0 if self.ground is not None else low
+        nodes = (right - left) * (high - low) / self.numerics.spacing_m**2
+        if nodes > LARGEST_GRID:
+            problems.append(
+                f"domain of {right - left:.3g} m by {high - low:.3g} m at numerics.spacing_m = "
+                f"{self.numerics.spacing_m:g} asks for a grid of {nodes:.3g} nodes (about "
+                f"{nodes * BYTES_PER_NODE / 1e9:.3g} GB of memory); at most {LARGEST_GRID:.3g} are allowed"
+            )
+        snapshots = points * BYTES_PER_SNAPSHOT_POINT * self.output.end_time_s / self.output.snapshot_interval_s
+        if points <= LARGEST_SCENE and snapshots > LARGEST_SNAPSHOTS:
+            problems.append(
+                f"output.snapshot_interval_s = {self.output.snapshot_interval_s:g} asks for about {snapshots / 1e9:.3g} "
+                f"GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
             )
         for name in ("time_series_interval_s", "snapshot_interval_s"):
             interval = getattr(self.output, name)

@@ -61,8 +61,8 @@ CRITERIA = (
         "pressure_ratio",
         1.0,
         1.0,
-        "greatest pore pressure over rho c v + rho g h, the water hammer of the fastest point (wave theory), c with "
-        "the phases moving together",
+        "greatest pore pressure over rho c v + rho v² + rho g h: water hammer (c with the phases moving together) and "
+        "stagnation of the fastest point, and rest",
     ),
     Criterion(
         "penetration",

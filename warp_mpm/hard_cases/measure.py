@@ -137,7 +137,7 @@ def _of_the_series(scenario: Scenario, columns: dict[str, Array]) -> dict[str, f
     if "pore_pressure_max_anywhere" in columns:
         material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
         still = material.density * scenario.gravity.acceleration_m_per_s2 * depth
-        hammer = material.density * step_limits(scenario).sound_speed * fastest
+        hammer = material.density * (step_limits(scenario).sound_speed + fastest) * fastest
         greatest = float(columns["pore_pressure_max_anywhere"].max())
         figures |= {"pore_pressure_max": greatest, "pressure_ratio": greatest / max(hammer + still, 1.0)}
     impact = impact_figures(columns["time"], columns.get("impact_force_x"))

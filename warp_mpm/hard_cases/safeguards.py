@@ -27,6 +27,11 @@ SAFEGUARDS = (
         "`face_90`: the pressure noise doubles and more",
     ),
     Safeguard(
+        "bound on gaps",
+        "a point that has parted from the flow remembers no more void than its neighbours leave",
+        "`set_iib`: after the landing nine points in ten keep a gap, and the deposit loses half its pore pressure",
+    ),
+    Safeguard(
         "bulk viscosity",
         "artificial pressure against compression at the rate of sound",
         "a column stopped at its base: the pressure behind the front of sound overshoots by a quarter",
