@@ -116,7 +116,9 @@ def resume_run(
 
     Args:
         out: the run folder.
-        make_simulation, on_progress, stop: as in `run_scenario`.
+        make_simulation: as in `run_scenario`.
+        on_progress: as in `run_scenario`.
+        stop: as in `run_scenario`.
 
     Raises:
         RunFolderError: there is nothing to go on with, or it is damaged; the sentence says so, nothing was touched.

@@ -1,0 +1,84 @@
+"""What the documentation tells a reader to type is typed: every `bash` and `python` block of the pages, in order.
+
+Blocks marked `console` are for other machines (a cluster, a GPU) or take long; they are not typed. A `json` block with
+a title is saved under that name, as the page asks its reader to do. Pages that run many scenes are marked slow.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import analytic.cli
+import warp_mpm.cli
+
+ROOT = Path(__file__).parents[2]
+QUICK = ("index", "api", "how_to/material")
+PAGES = ("index", "tutorial", "api", *(f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md"))))
+
+BLOCK = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def blocks(page):
+    return BLOCK.findall((ROOT / "docs" / f"{page}.md").read_text())
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder as a reader has it: the scenarios at hand, the results in `runs`."""
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "page", [page if page in QUICK else pytest.param(page, marks=pytest.mark.slow) for page in PAGES]
+)
+def test_page_does_what_it_says(page, folder):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
+    for language, title, text in blocks(page):
+        if title:
+            (folder / title).write_text(text)
+            continue
+        if language == "python":
+            commands = [[sys.executable, "-c", text]]
+        elif language == "bash":
+            lines = text.replace("\\\n", " ").strip().split("\n")
+            assert all(line.startswith("python ") for line in lines), text
+            commands = [[sys.executable, *shlex.split(line)[1:]] for line in lines]
+        else:
+            continue
+        for command in commands:
+            answer = subprocess.run(
+                command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+            )
+            assert answer.returncode == 0, f"{' '.join(command[1:])}\n{answer.stdout}\n{answer.stderr}"
+
+
+def test_commands_of_the_papers_figures_exist():
+    """The figures themselves need minutes of runs; here, that each command is one and its scenes are there."""
+    text = (ROOT / "docs/paper_figures.md").read_text()
+    commands = re.findall(r"`(python -m [^`]+)`", text)
+    assert len(commands) >= 12
+    apps = {"warp_mpm": warp_mpm.cli.app, "analytic": analytic.cli.app}
+    for command in commands:
+        module, verb = command.split()[2:4]
+        answer = CliRunner().invoke(apps[module], [verb, "--help"], env={"COLUMNS": "200"})
+        assert answer.exit_code == 0, command
+        for run in re.findall(r"runs/(\w+)", command):
+            assert (ROOT / "scenarios" / f"{run}.json").exists(), run
+        for option in re.findall(r"--[a-z-]+", command):
+            assert option in answer.stdout, (command, option)
+
+
+def test_navigation_leads_to_pages():
+    """That no page is left out of it, the strict build checks."""
+    navigation = (ROOT / "docs/site/mkdocs.yml").read_text().split("\nnav:\n")[1]
+    listed = re.findall(r": (\S+\.md)", navigation)
+    assert len(listed) > 15
+    for page in listed:
+        assert (ROOT / "docs" / page).is_file(), page
