@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effects import Effects
-from .scenario import DryFlow, Scenario, Sliding, TwoPhaseFlow
+from .scenario import DryFlow, Scenario, TwoPhaseFlow
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Rule:
     reason: str
     """Why, in the words of the scenario file."""
     switched: Mapping[str, Any] = field(default_factory=dict)
-    """Changes of the scenario that switch the effect off, or to its cheaper kind; empty where none does."""
+    """Changes of the scenario that switch the effect off, on, or to its other kind; empty where none does."""
 
     @property
     def on(self) -> bool:
@@ -42,6 +42,7 @@ def effect_rules(scenario: Scenario) -> list[Rule]:
 def _material_rules(scenario: Scenario) -> list[Rule]:
     flow = scenario.flow
     drag: str = scenario.numerics.drag if isinstance(flow, TwoPhaseFlow) else "none"
+    two_phase = isinstance(flow, TwoPhaseFlow)
     porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
     return [
         Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
@@ -49,18 +50,19 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             "plasticity",
             flow.material.plasticity,
             _setting("flow.material.plasticity", flow.material.plasticity),
-            {"flow.material.plasticity": False},
+            {"flow.material.plasticity": not flow.material.plasticity},
         ),
         Rule(
             "drag",
             drag,
             f"two phases, numerics.drag = {drag}" if drag != "none" else "there are no two phases",
+            {"numerics.drag": {"semi_implicit": "explicit", "explicit": "semi_implicit"}[drag]} if two_phase else {},
         ),
         Rule(
             "porosity_update",
             porosity,
-            _setting("flow.material.porosity_update", porosity) if drag != "none" else "there are no two phases",
-            {"flow.material.porosity_update": False},
+            _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
+            {"flow.material.porosity_update": not porosity} if two_phase else {},
         ),
     ]
 
@@ -70,68 +72,75 @@ def _numerical_rules(scenario: Scenario) -> list[Rule]:
     liquid = not isinstance(scenario.flow, DryFlow)
     relaxation = f"numerics.pressure_relaxation = {numerics.pressure_relaxation:g}"
     return [
-        Rule("precision", numerics.precision, f"numerics.precision = {numerics.precision}"),
+        Rule(
+            "precision",
+            numerics.precision,
+            f"numerics.precision = {numerics.precision}",
+            {"numerics.precision": "float32" if numerics.precision == "float64" else "float64"},
+        ),
         Rule(
             "volumetric_smoothing",
             numerics.volumetric_smoothing,
             _setting("numerics.volumetric_smoothing", numerics.volumetric_smoothing),
-            {"numerics.volumetric_smoothing": False},
+            {"numerics.volumetric_smoothing": not numerics.volumetric_smoothing},
         ),
         Rule(
             "pressure_relaxation",
             liquid and numerics.pressure_relaxation > 0.0,
             relaxation if liquid else "there is no liquid",
-            {"numerics.pressure_relaxation": 0.0},
+            {"numerics.pressure_relaxation": 0.0 if numerics.pressure_relaxation > 0.0 else 1.0} if liquid else {},
         ),
         Rule(
             "bulk_viscosity",
             numerics.bulk_viscosity > 0.0,
             f"numerics.bulk_viscosity = {numerics.bulk_viscosity:g}",
-            {"numerics.bulk_viscosity": 0.0},
+            {"numerics.bulk_viscosity": 0.0 if numerics.bulk_viscosity > 0.0 else 0.2},
         ),
         Rule(
             "transfer",
             numerics.transfer,
             f"numerics.transfer = {numerics.transfer}",
-            {"numerics.transfer": "flip"} if numerics.transfer == "apic" else {"numerics.transfer": "apic"},
+            {"numerics.transfer": "flip" if numerics.transfer == "apic" else "apic"},
         ),
     ]
 
 
 def _surface_rules(scenario: Scenario) -> list[Rule]:
     barrier, ground, domain = scenario.barrier, scenario.ground, scenario.domain
-    if barrier is None:
-        motion, rubs = "none", False
-        why = why_rubs = "there is no barrier"
-    else:
+    motion, rubs = "none", False
+    other_motion: dict[str, Any] = {}
+    other_friction: dict[str, Any] = {}
+    why = why_rubs = "there is no barrier"
+    if barrier is not None:
         motion = {"fixed": "fixed", "sliding": "sliding", "prescribed": "driven"}[barrier.motion.kind]
         why = f"barrier.motion.kind = {barrier.motion.kind}"
+        other_motion = {"barrier": None} if motion == "fixed" else {"barrier.motion": {"kind": "fixed"}}
         greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
         rubs = greatest > 0.0
         why_rubs = f"the greatest of barrier.friction is {greatest:g}"
-    slides = barrier is not None and isinstance(barrier.motion, Sliding)
+        other_friction = {"barrier.friction": 0.0 if rubs else 0.3}
     surface = "none" if ground is None else "frictional" if ground.friction > 0.0 else "smooth"
     walls = [name for name in ("left_edge", "right_edge") if getattr(domain, name) == "wall"]
     return [
-        Rule("barrier", motion, why, {"barrier.motion": {"kind": "fixed"}} if slides else {"barrier": None}),
-        Rule("barrier_friction", rubs, why_rubs, {"barrier.friction": 0.0}),
+        Rule("barrier", motion, why, other_motion),
+        Rule("barrier_friction", rubs, why_rubs, other_friction),
         Rule(
             "ground",
             surface,
             "ground = null" if ground is None else f"ground.friction = {ground.friction:g}",
-            {"ground.friction": 0.0} if surface == "frictional" else {},
+            {} if ground is None else {"ground.friction": 0.0 if surface == "frictional" else 0.3},
         ),
         Rule(
             "side_walls",
             bool(walls),
             " and ".join(f"domain.{name} = wall" for name in walls) if walls else "both edges of the domain are open",
-            {"domain.left_edge": "open", "domain.right_edge": "open"},
+            dict.fromkeys(("domain.left_edge", "domain.right_edge"), "open" if walls else "wall"),
         ),
         Rule(
             "ceiling",
             domain.top_edge == "wall",
             f"domain.top_edge = {domain.top_edge}",
-            {"domain.top_edge": "open"},
+            {"domain.top_edge": "open" if domain.top_edge == "wall" else "wall"},
         ),
     ]
 

@@ -147,7 +147,7 @@ def test_every_rule_names_an_effect_and_gives_a_reason():
         assert {rule.effect for rule in rules} == set(effects.__dataclass_fields__)
         assert all(rule.reason and getattr(effects, rule.effect) == rule.value for rule in rules)
         for rule in rules:
-            if rule.on and rule.switched:
+            if rule.switched:
                 switched = derive_effects(scenario.replaced(rule.switched))
                 assert getattr(switched, rule.effect) != rule.value
 

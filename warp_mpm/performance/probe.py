@@ -1,0 +1,87 @@
+"""Cost of a step, measured in turns so that a machine with other work to do tells ratios that hold."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+from warp_mpm.time_step import step_limits
+
+
+def clock_of(device: str) -> Callable[[], float]:
+    """The clock for comparisons: on the CPU that of the process, which stands still while others have the processor."""
+    return time.process_time if device == "cpu" else time.perf_counter
+
+
+class Measured(Protocol):
+    """Something whose cost per point and step can be taken again and again."""
+
+    def chunk(self, seconds: float) -> float:
+        """Work for about `seconds` and return the cost [ns] per point and step."""
+
+
+class Stepper:
+    """A simulation, begun and compiled, that is stepped on to see what a step costs."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        device: str = "cpu",
+        clock: Callable[[], float] = time.perf_counter,
+        interval: float = math.inf,
+    ) -> None:
+        """Args: scenario; device: a Warp device; clock: tells time [s]; interval: between two records [s], at which a
+        run comes back to Python, as it does here."""
+        self._clock, self._interval = clock, interval
+        self.simulation = Simulation(scenario, device=device)
+        self._points = self.simulation.material_points
+        self.simulation.advance(1e-6 * scenario.output.time_series_interval_s)
+        limits, numerics = step_limits(scenario), scenario.numerics
+        wave = numerics.spacing_m / (limits.wave_speed + scenario.flow.speed)
+        self._step = numerics.courant_number * min(wave, limits.drag_step)
+        self._per_step = self._cost(2)[0] / 2.0
+
+    def _cost(self, steps: int) -> tuple[float, int]:
+        """Time [s] of about that many steps, and their number."""
+        simulation, before = self.simulation, self.simulation.steps
+        now, end = simulation.time, simulation.time + steps * self._step
+        begin = self._clock()
+        while now < end:
+            now = min(now + self._interval, end)
+            simulation.advance(now)
+        spent = self._clock() - begin
+        return spent, simulation.steps - before
+
+    def chunk(self, seconds: float) -> float:
+        """Step for about `seconds` and return the cost [ns] per point and step."""
+        spent, steps = self._cost(max(4, math.ceil(seconds / self._per_step)))
+        self._per_step = max(spent / steps, 1e-7)
+        return 1e9 * spent / (steps * self._points)
+
+
+def in_turns(measured: Sequence[Measured], *, rounds: int, seconds: float) -> list[float]:
+    """Cost [ns] per point and step of each, as the median over the rounds of its ratio to the first, times the first's
+    own median: what slows the machine for a while slows all of a round.
+
+    Args:
+        measured: the first is what the others are set against.
+        rounds: how often each has its turn.
+        seconds: wall time of a turn [s].
+    """
+    for each in measured:
+        each.chunk(0.2 * seconds)  # caches and the length of a turn
+    costs = []
+    for turn in range(rounds):
+        row = [0.0] * len(measured)
+        for place in range(len(measured)):
+            k = (place + turn) % len(measured)  # nobody always follows the same one, whose data fill the caches
+            row[k] = measured[k].chunk(seconds)
+        costs.append(row)
+    first = statistics.median(row[0] for row in costs)
+    return [first * statistics.median(row[k] / row[0] for row in costs) for k in range(len(measured))]
