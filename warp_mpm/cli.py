@@ -5,7 +5,9 @@ Exit codes: 0 done, 2 the input cannot be used (one sentence says why), 3 the si
 
 from __future__ import annotations
 
+import json
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -54,7 +56,24 @@ def run(
     until: Annotated[
         float | None, typer.Option(help="End time in seconds.", show_default="that of the scenario")
     ] = None,
+    accuracy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PERCENT",
+            help="Choose the spacing that keeps this error of peak force, impulse and sliding distance: 5%.",
+            show_default=False,
+        ),
+    ] = None,
+    budget: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", help="Choose the finest spacing that fits into this time: 60s, 10min.", show_default=False
+        ),
+    ] = None,
     report: Annotated[bool, typer.Option("--report", help="Write report.html into the folder at the end.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the summary as JSON, SI units, in place of the table.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     resume: Annotated[
@@ -76,12 +95,16 @@ def run(
 
     Exit codes: 0 done, 2 the input cannot be used, 3 the simulation diverged, 130 interrupted.
     """
+    if (accuracy, budget) != (None, None) and (None not in (accuracy, budget) or spacing is not None):
+        _refuse("--accuracy and --budget choose the spacing; of them and --spacing only one is allowed.")
+    if (accuracy, budget) != (None, None) and (resume is not None or len(scenario_files or []) > 1):
+        _refuse("--accuracy and --budget are for one new run, not for --resume nor for several scenarios.")
     if scenario_files and len(scenario_files) > 1:
         if resume is not None:
             _refuse("--resume DIR goes on with one run; it takes no scenario files.")
         from warp_mpm.commands.several import run_several
 
-        run_several(scenario_files, out, jobs, _options(device, spacing, until, report, force), quiet)
+        run_several(scenario_files, out, jobs, _options(device, spacing, until, report, force), quiet, as_json)
         return
     scenario_file = scenario_files[0] if scenario_files else None
     if resume is not None:
@@ -104,6 +127,12 @@ def run(
             RunFolder.check(folder, force=force)
     except RunFolderError as error:
         _refuse(str(error))
+    offer, bought_at = None, time.process_time()
+    if accuracy is not None or budget is not None:
+        from warp_mpm.commands.accuracy import bought
+
+        offer, scenario = bought(scenario, accuracy, budget, device, quiet=quiet)
+        bought_at = time.process_time()
     from warp_mpm.simulation import Simulation, SimulationDiverged
 
     def make_simulation(scenario: Scenario) -> Simulation:
@@ -113,7 +142,7 @@ def run(
             _refuse(str(error))
 
     try:
-        with StopOnSignal() as signal, RunDisplay(scenario, device=device, quiet=quiet) as display:
+        with StopOnSignal() as signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display:
             stopped = lambda: signal.received  # noqa: E731
             if resume is not None:
                 outcome = resume_run(folder, make_simulation=make_simulation, on_progress=display.show, stop=stopped)
@@ -146,7 +175,12 @@ def run(
         from warp_mpm.results import Results
 
         write_report([Results.open(folder)], folder / "report.html")
-    display.summarize(outcome)
+    if as_json:
+        typer.echo(json.dumps(outcome.summary, indent=2, ensure_ascii=False))
+    else:
+        display.summarize(outcome)
+    if offer is not None and outcome.finished and not quiet:
+        typer.echo(offer.settled(folder, time.process_time() - bought_at))
     if not outcome.finished:
         _complain(
             f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "

@@ -64,3 +64,12 @@ def test_nothing_is_begun_where_one_scene_cannot_be(tmp_path, files, words):
     assert answer.exit_code == 2
     assert words in answer.stderr
     assert not (tmp_path / "runs").exists()
+
+
+def test_summaries_as_json(tmp_path, monkeypatch):
+    monkeypatch.chdir(SCENES.parent)
+    scene, more = str(SCENES / "case_1.json"), str(SCENES / "case_1_dry.json")
+    one = CliRunner().invoke(app, ["run", scene, "--out", str(tmp_path / "one"), "--json", *COARSE])
+    assert json.loads(one.stdout) == json.loads((tmp_path / "one/summary.json").read_text())
+    two = CliRunner().invoke(app, ["run", scene, more, "--out", str(tmp_path / "two"), "--json", *COARSE])
+    assert list(json.loads(two.stdout)) == [str(tmp_path / "two" / name) for name in ("case_1", "case_1_dry")]

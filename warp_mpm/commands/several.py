@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,9 @@ DIVERGED, INTERRUPTED = 3, 130
 """Exit codes of `run` that leave results behind."""
 
 
-def run_several(files: list[Path], out: Path | None, jobs: int | None, options: list[str], quiet: bool) -> None:
+def run_several(
+    files: list[Path], out: Path | None, jobs: int | None, options: list[str], quiet: bool, as_json: bool
+) -> None:
     """Run each scene in a process of its own and tell how each went.
 
     Args:
@@ -23,6 +27,7 @@ def run_several(files: list[Path], out: Path | None, jobs: int | None, options: 
         jobs: at the same time; None: as many as there are cores.
         options: of `run`, handed on to each.
         quiet: print errors only.
+        as_json: print the summaries as JSON, by folder, in place of the table.
 
     Raises:
         typer.Exit: 2 when a file cannot be used and nothing was begun; otherwise the greatest exit code of the runs.
@@ -80,20 +85,34 @@ def run_several(files: list[Path], out: Path | None, jobs: int | None, options: 
     for end in ends:
         if end.code != 0:
             complain(f"{end.job.name}: {end.message or f'ended with exit code {end.code}'}")
-    if not quiet:
-        begun = [end for end in ends if end.code in (0, DIVERGED, INTERRUPTED)]
-        _print([end.job.folder for end in sorted(begun, key=lambda end: planned.index(end.job))])
+    begun = sorted(
+        (end for end in ends if end.code in (0, DIVERGED, INTERRUPTED)), key=lambda end: planned.index(end.job)
+    )
+    summaries = _summaries([end.job.folder for end in begun])
+    if as_json:
+        typer.echo(json.dumps(summaries, indent=2, ensure_ascii=False))
+    elif not quiet:
+        _print(summaries)
     code = max((end.code if end.code > 0 else 1 for end in ends if end.code != 0), default=0)
     if code or signal.received:
         raise typer.Exit(INTERRUPTED if signal.received else code)
 
 
-def _print(folders: list[Path]) -> None:
+def _summaries(folders: list[Path]) -> dict[str, dict[str, Any]]:
+    """Summary by folder; a run that ended before it had one is left out."""
+    from warp_mpm.results import Results, ResultsError
+
+    found = {}
+    for folder in folders:
+        with contextlib.suppress(ResultsError):
+            found[str(folder)] = Results.open(folder).summary
+    return found
+
+
+def _print(summaries: dict[str, dict[str, Any]]) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
-
-    from warp_mpm.results import Results, ResultsError
 
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
@@ -101,17 +120,13 @@ def _print(folders: list[Path]) -> None:
     table = Table(box=box.SIMPLE_HEAD)
     for heading in ("run", "status", "peak F₂ₓ [kN/m]", "impulse [kN s/m]", "Δx [m]", "mechanism", "wall time [s]"):
         table.add_column(heading, justify="left" if heading in ("run", "status", "mechanism") else "right")
-    for folder in folders:
-        try:
-            summary = Results.open(folder).summary
-        except ResultsError:
-            continue
+    for folder, summary in summaries.items():
 
         def cell(name: str, factor: float = 1.0, summary: dict[str, Any] = summary) -> str:
             return "–" if summary.get(name) is None else f"{summary[name] * factor:,.4g}"
 
         table.add_row(
-            str(folder),
+            folder,
             str(summary.get("status")),
             cell("peak_force_filtered", 1e-3),
             cell("impulse", 1e-3),

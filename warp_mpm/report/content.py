@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analytic.arrays import trajectory
 from analytic.calibration import RULES, Calibration, CalibrationError, calibrate, misfit
 from analytic.scene import SceneError, scene_of
+from warp_mpm.effect_rules import effect_rules
 from warp_mpm.results import Results
 from warp_mpm.scenario import Trapezoid, Wall
 from warp_mpm.summary import FILTER_WINDOW, moving_mean
@@ -85,7 +86,7 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "charts": [chart for chart in (_chart(series, *chart, fits) for chart in CURVES) if chart is not None],
         "closed_form": [_fit_row(fit, series) for fit in fits],
         "ledger": ledger(series, results.summary),
-        "effects": {key: str(value) for key, value in (record.get("effects") or {}).items()},
+        "effects": {rule.effect: f"{_text(rule.value)}: {rule.reason}" for rule in effect_rules(scenario)},
         "settings": {path: _text(value) for path, value in flattened(scenario.resolved())},
         "versions": _versions(record),
         "warnings": warnings(results) + no_fit,
@@ -268,6 +269,10 @@ def _versions(record: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _text(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "on" if value else "off"
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, list) and len(value) > 8:

@@ -247,7 +247,10 @@ function watchPointer(canvas, cloud, view, draw) {
       `y = ${cloud.toValue(1, cloud.raw(frame, 1)[point]).toFixed(2)} m`];
     cloud.points.fields.forEach((field, index) => {
       const value = cloud.toValue(2 + index, cloud.raw(frame, 2 + index)[point]);
-      lines.push(`${field.label}: ${value.toLocaleString("en", {maximumSignificantDigits: 3})} ${field.unit}`);
+      // What is below the step of the packing is nil.
+      const [low, high] = cloud.points.ranges[2 + index], shown = Math.abs(value) < (high - low) / 65535 ? 0 : value;
+      const unit = field.unit === "-" ? "" : " " + field.unit;
+      lines.push(`${field.label}: ${shown.toLocaleString("en", {maximumSignificantDigits: 3})}${unit}`);
     });
     tip.show(event, lines.join("\n"));
   });
