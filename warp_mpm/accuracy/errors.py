@@ -1,0 +1,219 @@
+"""Errors of runs against the answer toward which the spacing leads, and how sure that answer is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from warp_mpm.accuracy.measure import smoothed_force
+from warp_mpm.accuracy.runner import Result
+from warp_mpm.accuracy.study import DEFAULT, Setting
+from warp_mpm.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A figure or a curve whose error is measured."""
+
+    name: str
+    label: str
+    unit: str
+    factor: float = 1.0
+    """From SI to `unit`."""
+    scale: str = "itself"
+    """What an error is relative to: `itself`, the name of another figure, or `volume` of the flow."""
+    curve: str | None = None
+    """Column of a curve; its error is the root mean square over the run, relative to the curve's greatest value."""
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("peak_force", "peak force, 10 ms mean", "kN/m", 1e-3),
+        Quantity("peak_force_time", "time of the peak (of T₂)", "s", scale="impact_duration"),
+        Quantity("impulse", "impulse", "kN s/m", 1e-3),
+        Quantity("impact_impulse", "impulse until T₂", "kN s/m", 1e-3),
+        Quantity("impact_duration", "impact duration T₂", "s"),
+        Quantity("barrier_displacement_final", "sliding distance Δx", "m"),
+        Quantity("barrier_velocity_max", "greatest barrier velocity", "m/s"),
+        Quantity("pore_pressure_max", "greatest pore pressure", "kPa", 1e-3),
+        Quantity("overtopped_volume", "volume overtopped (of the flow's)", "m³/m", scale="volume"),
+        Quantity("force_curve", "force over time, 50 ms mean", "kN/m", 1e-3, curve="impact_force_x"),
+        Quantity("energy_curve", "flow's kinetic energy over time", "kJ/m", 1e-3, curve="flow_kinetic_energy"),
+        Quantity("displacement_curve", "displacement over time", "m", curve="barrier_displacement"),
+    )
+}
+
+KEY_QUANTITIES = ("peak_force", "impulse", "barrier_displacement_final")
+"""What a design needs; their greatest error is the error of a setting as a whole."""
+
+SAFETY, POOR_SAFETY = 1.25, 3.0
+"""Factors on an extrapolation whose order of convergence was observed, or not (Roache's grid convergence index)."""
+
+ORDERS = (0.5, 2.0)
+"""Orders of convergence that are believed when observed (Eça and Hoekstra 2014)."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The value toward which a ladder leads."""
+
+    value: float
+    uncertainty: float
+    """Half the width of the interval in which the value is thought to lie."""
+    order: float | None
+    """Observed order of convergence; None where the ladder shows none."""
+
+
+def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Reference:
+    """Richardson's extrapolation by least squares, f = f0 + a h^p, over a ladder in any order.
+
+    Where the observed p lies in `ORDERS`, f0 is the answer, and its uncertainty 1.25 times the distance to the finest
+    run, plus the scatter about the fit. Where it does not, the finest run itself is the answer, with the spread of the
+    last three values as its uncertainty: a ladder without order gives no reason to go beyond it. (Eça and Hoekstra,
+    J. Comput. Phys. 262, 2014, simplified.)
+
+    Raises:
+        ValueError: fewer than three values.
+    """
+    if len(values) < 3:
+        raise ValueError("an extrapolation needs at least three spacings")
+    order = np.argsort(spacings)
+    h, f = np.asarray(spacings, dtype=float)[order], np.asarray(values, dtype=float)[order]
+    spread = float(np.ptp(f[:3]))
+    if spread <= 1e-12 * float(np.abs(f).max()):
+        return Reference(float(f[0]), spread, None)
+    weights = 1.0 / h  # fine runs count more
+
+    def fit(p: float) -> tuple[float, float, float]:
+        basis = np.stack([np.ones_like(h), (h / h[0]) ** p], axis=1)
+        (f0, a), *_ = np.linalg.lstsq(basis * weights[:, None], f * weights, rcond=None)
+        residual = f - basis @ (f0, a)
+        return float(f0), float(a), float(np.sqrt((residual**2 * weights).sum() / weights.sum()))
+
+    best = float(minimize_scalar(lambda p: fit(p)[2], bounds=(0.1, 4.0), method="bounded").x)
+    f0, change, scatter = fit(best)
+    # A fit that explains less than half of what varies has not seen an order.
+    if ORDERS[0] <= best <= ORDERS[1] and scatter < 0.25 * float(np.ptp(f)) and abs(change) > scatter:
+        return Reference(f0, SAFETY * abs(f[0] - f0) + scatter, best)
+    return Reference(float(f[0]), spread, None)
+
+
+@dataclass(frozen=True)
+class References:
+    """What errors of one scene are measured against."""
+
+    scalars: dict[str, Reference]
+    curves: dict[str, Array]
+    """Curves of the finest run, by the quantity's name."""
+    curve_uncertainty: dict[str, float]
+    """Relative difference of the two finest runs' curves."""
+    scales: dict[str, float]
+    """What an error of each quantity is relative to [SI]."""
+    finest: Result
+    """The run that is itself the reference where no order was observed."""
+
+    def uncertainty(self, name: str) -> float:
+        """Relative uncertainty of a quantity's reference."""
+        if name in self.scalars:
+            return self.scalars[name].uncertainty / self.scales[name]
+        return self.curve_uncertainty[name]
+
+    @property
+    def names(self) -> list[str]:
+        """Quantities that the scene has, in the order of `QUANTITIES`."""
+        return [name for name in QUANTITIES if name in self.scalars or name in self.curves]
+
+    @property
+    def key_names(self) -> list[str]:
+        """Those of `KEY_QUANTITIES` that the scene has."""
+        return [name for name in KEY_QUANTITIES if name in self.scalars]
+
+
+def references(scenario: Scenario, ladder: Sequence[Setting], results: Mapping[str, Result]) -> References:
+    """References from the ladder of a scene's own settings.
+
+    Args:
+        scenario: the scene.
+        ladder: settings that differ in spacing only; those that diverged are left out.
+        results: by the settings' keys.
+
+    Raises:
+        ValueError: fewer than three runs of the ladder came to their end.
+    """
+    runs = sorted((s for s in ladder if results[s.key]["status"] == "finished"), key=lambda s: s.spacing)
+    if len(runs) < 3:
+        raise ValueError("Fewer than three spacings came to their end; a reference needs at least three.")
+    found = [results[setting.key] for setting in runs]
+    spacings = [setting.spacing for setting in runs]
+    scalars, scales = {}, {}
+    for name, quantity in QUANTITIES.items():
+        values = [result["figures"].get(name) for result in found]
+        if quantity.curve is None and all(value is not None for value in values):
+            scalars[name] = extrapolate(spacings, values)
+    for name, reference in scalars.items():
+        scale = QUANTITIES[name].scale
+        size = reference.value
+        if scale == "volume":
+            size = scenario.flow.volume
+        elif scale in scalars:
+            size = scalars[scale].value
+        elif scale != "itself":
+            size = scenario.output.end_time_s
+        scales[name] = abs(size) or 1.0
+    finest, second = found[0], found[1]
+    curves, doubt = {}, {}
+    for name, quantity in QUANTITIES.items():
+        if quantity.curve is not None and quantity.curve in finest["curves"]:
+            curve = _curve(finest, quantity)
+            # A barrier that does not move has a displacement, but no curve of one.
+            if np.abs(curve).max() > 0.0:
+                curves[name], scales[name] = curve, float(np.abs(curve).max())
+                doubt[name] = _distance(_curve(second, quantity), curve)
+    return References(scalars, curves, doubt, scales, finest)
+
+
+def errors(result: Result, references: References) -> dict[str, float]:
+    """Relative errors of a run that came to its end, by quantity; signed for scalars.
+
+    A run that is itself the reference is off by what the reference is not known to.
+    """
+    found = {}
+    for name in references.names:
+        quantity = QUANTITIES[name]
+        extrapolated = name in references.scalars and references.scalars[name].order is not None
+        if result is references.finest and not extrapolated:
+            found[name] = references.uncertainty(name)
+        elif name in references.curves:
+            if quantity.curve in result["curves"]:
+                found[name] = _distance(_curve(result, quantity), references.curves[name])
+        elif result["figures"].get(name) is not None:
+            found[name] = (result["figures"][name] - references.scalars[name].value) / references.scales[name]
+    return found
+
+
+def overall(found: Mapping[str, float], references: References) -> float:
+    """Greatest error of the key quantities; infinite where one is missing."""
+    return max((abs(found.get(name, np.inf)) for name in references.key_names), default=np.inf)
+
+
+def ladder_of(settings: Sequence[Setting], knob: str = DEFAULT, level: Any = None) -> list[Setting]:
+    """The settings that share a knob's level, fine first."""
+    return sorted((s for s in settings if s.knob == knob and s.level == level), key=lambda s: s.spacing)
+
+
+def _curve(result: Result, quantity: Quantity) -> Array:
+    if quantity.curve == "impact_force_x":
+        return np.asarray(smoothed_force(result["curves"]))
+    return np.asarray(result["curves"][quantity.curve], dtype=float)
+
+
+def _distance(curve: Array, reference: Array) -> float:
+    return float(np.sqrt(np.mean((curve - reference) ** 2)) / np.abs(reference).max())

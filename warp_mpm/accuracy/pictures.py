@@ -1,0 +1,234 @@
+"""The pictures of a study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from warp_mpm.accuracy.errors import QUANTITIES
+from warp_mpm.accuracy.formulas import Formula
+from warp_mpm.accuracy.study import DEFAULT, KNOBS, level_text
+from warp_mpm.accuracy.tables import formula_errors
+from warp_mpm.accuracy.verdict import Study, error_of
+from warp_mpm.plotting.style import BLUE, GREY, ORANGE, RUN_COLOURS, grid
+
+LEAST_ERROR = 1e-4
+"""Errors below are drawn here: less than any reference is known to."""
+
+MARKERS = "osD^v<>P"
+
+PANELS = (
+    *("overall", "peak_force", "impulse", "barrier_displacement_final", "barrier_velocity_max", "impact_duration"),
+    *("peak_force_time", "pore_pressure_max", "overtopped_volume", "force_curve", "energy_curve", "displacement_curve"),
+)
+
+
+def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
+    """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left."""
+    names = [name for name in PANELS if name == "overall" or name in study.references.names]
+    columns = 4
+    rows = math.ceil(len(names) / columns)
+    figure = Figure(figsize=(15.0, 3.3 * rows + 1.0), layout="constrained")
+    figure.suptitle(f"{study.scenario.title}: error against CPU time", fontsize=12)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel in panels[len(names) :]:
+        panel.set_axis_off()
+    for panel, name in zip(panels, names, strict=False):
+        _error_panel(panel, study, name, found)
+    handles: dict[str, Any] = {}
+    for panel in panels[: len(names)]:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5, fontsize=8)
+    return figure
+
+
+def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula]) -> None:
+    knobs = [DEFAULT, *(knob for knob in KNOBS if any(row.setting.knob == knob for row in study.rows))]
+    for number, knob in enumerate(knobs):
+        rows = [r for r in study.rows if r.setting.knob == knob and math.isfinite(error_of(r, name))]
+        panel.plot(
+            [row.time for row in rows],
+            [_drawn(error_of(row, name)) for row in rows],
+            MARKERS[number % len(MARKERS)],
+            color=RUN_COLOURS[number % len(RUN_COLOURS)],
+            markersize=6 if knob == DEFAULT else 4.5,
+            markerfacecolor=None if knob == DEFAULT else "none",
+            label="spacing alone" if knob == DEFAULT else knob,
+        )
+    best = study.fronts[name]
+    panel.plot(
+        [r.time for r in best], [_drawn(error_of(r, name)) for r in best], "-", color=GREY, linewidth=1.2, zorder=1
+    )
+    for row in study.rows:
+        if row.setting.knob == DEFAULT and row.errors:
+            panel.annotate(
+                f"{row.setting.spacing:g}", (row.time, _drawn(error_of(row, name))), fontsize=7, color=BLUE,
+                xytext=(3, 4), textcoords="offset points",
+            )  # fmt: skip
+    for number, formula in enumerate(found):
+        error = formula_errors(study, formula).get(name)
+        if error is not None:
+            panel.plot(
+                formula.time, _drawn(abs(error)), ("*", "P", "X", "p", "h", "d", "8")[number % 7],
+                color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
+            )  # fmt: skip
+    doubt = study.doubt(name)
+    panel.axhspan(LEAST_ERROR / 2, max(doubt, LEAST_ERROR), color="#EEEEEE", zorder=0)
+    _logarithmic(panel)
+    panel.set_title(_title(name), fontsize=9)
+    panel.set_xlabel("CPU time [s]", fontsize=8)
+    panel.set_ylabel("error (grey: reference unsure)", fontsize=8)
+
+
+def error_of_each_knob(study: Study) -> Figure:
+    """Error of the key figures against each knob alone; for the spacing, each quantity with its observed order."""
+    turned = [knob for knob in KNOBS if any(one.name == knob for one in study.knobs)]
+    columns = 3
+    rows = math.ceil((len(turned) + 1) / columns)
+    figure = Figure(figsize=(12.5, 3.3 * rows), layout="constrained")
+    figure.suptitle(f"{study.scenario.title}: each setting alone", fontsize=12)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel in panels[len(turned) + 1 :]:
+        panel.set_axis_off()
+    ladder = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda r: r.setting.spacing)
+    spacings = [row.setting.spacing for row in ladder]
+    for number, name in enumerate([*study.references.key_names, "pore_pressure_max", "energy_curve"]):
+        if name not in study.references.names:
+            continue
+        reference = study.references.scalars.get(name)
+        order = (
+            "" if reference is None else ", no order" if reference.order is None else f", order {reference.order:.2g}"
+        )
+        panels[0].plot(
+            spacings, [_drawn(error_of(row, name)) for row in ladder], "o-", color=RUN_COLOURS[number], linewidth=1.0,
+            markersize=4, label=f"{QUANTITIES[name].label}{order}",
+        )  # fmt: skip
+    _logarithmic(panels[0])
+    panels[0].set_xticks(spacings, [f"{value:g}" for value in spacings])
+    panels[0].minorticks_off()
+    panels[0].set_xlabel("spacing [m]")
+    panels[0].set_ylabel("error")
+    panels[0].legend(fontsize=6.5)
+    for panel, knob in zip(panels[1:], turned, strict=False):
+        points = [(one.level, one.overall, one.time_ratio) for one in study.knobs if one.name == knob]
+        one = next(one for one in study.knobs if one.name == knob)
+        own = getattr(study.scenario.numerics, knob)
+        points = sorted(
+            [*points, (own, one.default_overall, 1.0)],
+            key=lambda point: KNOBS[knob].index(point[0]) if point[0] in KNOBS[knob] else -1,
+        )
+        places = np.arange(len(points))
+        finite = [value if math.isfinite(value) else 0.0 for _, value, _ in points]
+        bars = panel.bar(
+            places,
+            [100.0 * value for value in finite],
+            color=[BLUE if level == own else GREY for level, _, _ in points],
+        )
+        texts = [f"{ratio:.2g}× time" if math.isfinite(value) else "diverged" for _, value, ratio in points]
+        panel.bar_label(bars, texts, fontsize=8)
+        panel.axhline(100.0 * study.doubt("overall"), color=ORANGE, linewidth=1.0, linestyle="--")
+        panel.set_xticks(places, [level_text(level) for level, _, _ in points])
+        panel.set_title(f"{knob} (blue: the scenario's own)", fontsize=9)
+        panel.set_ylabel("error of the key figures [%]", fontsize=8)
+        panel.margins(y=0.18)
+    return figure
+
+
+def where_time_goes(study: Study) -> Figure:
+    """CPU time of each spacing, and the share of each kernel in a step of the finest."""
+    ladder = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda r: -r.setting.spacing)
+    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
+    times, kernels = figure.subplots(1, 2)
+    places = np.arange(len(ladder))
+    parts: Mapping[str, str] = {
+        "cpu_time": "stepping",
+        "recording_time": "recording",
+        "preparation_time": "preparation",
+    }
+    below = np.zeros(len(ladder))
+    for (name, label), colour in zip(parts.items(), RUN_COLOURS, strict=False):
+        values = np.array([row.result[name] for row in ladder])
+        times.bar(places, values, bottom=below, color=colour, label=label)
+        below += values
+    times.set_xticks(places, [f"{row.setting.spacing:g}" for row in ladder])
+    times.set_xlabel("spacing [m]")
+    times.set_ylabel("CPU time [s]")
+    times.legend(fontsize=8)
+    for place, row in zip(places, ladder, strict=True):
+        rate = row.result["cpu_time"] / max(row.result["steps"] * row.result["material_points"], 1) * 1e9
+        times.annotate(f"{rate:.0f} ns", (place, below[place]), ha="center", va="bottom", fontsize=8)
+    times.set_title("CPU time; above, stepping per point and step", fontsize=9)
+    times.margins(y=0.1)
+    shares = ladder[-1].result["kernel_times"]
+    names = list(shares)[::-1]
+    kernels.barh(names, [100.0 * shares[name] for name in names], color=BLUE)
+    kernels.set_xlabel("share of a step [%], launched one by one")
+    kernels.set_title(f"kernels at spacing {ladder[-1].setting.spacing:g} m", fontsize=9)
+    return figure
+
+
+PRICED = ("peak_force", "impact_impulse", "impact_duration", "barrier_displacement_final")
+
+
+def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]]) -> Figure:
+    """All scenes in the same panels: simulations and formulas, error against time, from a microsecond up."""
+    figure = Figure(figsize=(13.0, 8.6), layout="constrained")
+    figure.suptitle("Error against the converged simulation, from a formula to the finest spacing", fontsize=12)
+    colours: dict[str, str] = {}
+    for panel, name in zip(figure.subplots(2, 2).ravel(), PRICED, strict=True):
+        for study, found in studies:
+            if name not in study.references.scalars:
+                continue
+            ladder = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda r: r.time)
+            ladder = [row for row in ladder if name in row.errors][:-1]  # the finest is close by making
+            panel.plot(
+                [row.time for row in ladder], [_drawn(error_of(row, name)) for row in ladder], "o-", color=BLUE,
+                markersize=3, linewidth=0.6, alpha=0.7, label="simulation, one line a scene",
+            )  # fmt: skip
+            for formula in found:
+                error = formula_errors(study, formula).get(name)
+                if error is None:
+                    continue
+                colour = colours.setdefault(formula.name, [c for c in RUN_COLOURS if c != BLUE][len(colours) % 7])
+                filled = study.scenario.barrier is not None and study.scenario.barrier.motion.kind == "fixed"
+                panel.plot(
+                    formula.time, _drawn(abs(error)), "s", color=colour, markersize=5,
+                    markerfacecolor=colour if filled else "none", label=formula.name,
+                )  # fmt: skip
+        _logarithmic(panel)
+        panel.set_title(_title(name), fontsize=10)
+        panel.set_xlabel("CPU time [s]")
+        panel.set_ylabel("error")
+    handles: dict[str, Any] = {}
+    for panel in figure.axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(
+        list(handles.values()), list(handles), loc="outside lower center", ncols=4, fontsize=8,
+        title="filled: fixed barrier; open: sliding barrier", title_fontsize=8,
+    )  # fmt: skip
+    return figure
+
+
+def _drawn(error: float) -> float:
+    return max(error, LEAST_ERROR)
+
+
+def _logarithmic(panel: Axes) -> None:
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.set_ylim(bottom=LEAST_ERROR / 1.5)
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g} %"))
+    panel.tick_params(labelsize=8)
+    grid(panel)
+
+
+def _title(name: str) -> str:
+    return "key figures, the worst" if name == "overall" else QUANTITIES[name].label

@@ -1,0 +1,314 @@
+"""Buying accuracy: the spacing that keeps an error, or that fits into a time, from a ladder of runs of the scene."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
+from warp_mpm.accuracy.runner import Result
+from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder, scene_key
+from warp_mpm.results import Results
+from warp_mpm.scenario import Scenario
+from warp_mpm.summary import cumulative_impulse
+
+DATA = "paper_scenes.json"
+"""Ladders of the paper's scenes, beside this file."""
+
+PROBE_CELLS = (6.0, 8.0, 11.0, 15.0)
+"""Spacings of a probe: cells in the flow's depth. The finest costs a few per cent of a run of 40 cells."""
+
+FINEST_CELLS = 120.0
+"""Most cells in the flow's depth that are sold: the law of the error was measured far coarser."""
+
+SAFETY = 1.25
+"""Factor on the extrapolated error."""
+
+OVERHEAD = 1.5
+"""Time of a process and its files [s] beside the stepping: imports, compiled kernels, figures."""
+
+
+class PurchaseError(ValueError):
+    """An accuracy or a budget that cannot be had; one sentence."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One run of a ladder."""
+
+    spacing: float
+    """[m]."""
+    time: float
+    """CPU time of stepping and recording [s]."""
+    figures: dict[str, float]
+    """Key quantities, SI."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What is chosen, and what is expected of it."""
+
+    spacing: float
+    """[m]."""
+    time: float
+    """Expected time of the run on this machine [s]."""
+    errors: dict[str, float]
+    """Expected relative errors of the key quantities."""
+    values: dict[str, float]
+    """Extrapolated values of the key quantities, SI."""
+    source: str
+    """What it rests on."""
+
+    @property
+    def error(self) -> float:
+        """Greatest of the expected errors."""
+        return max(self.errors.values())
+
+    def described(self) -> str:
+        """In words."""
+        parts = ", ".join(f"{QUANTITIES[name].label} {error:.1%}" for name, error in self.errors.items())
+        return (
+            f"Chosen: spacing {self.spacing:g} m ({self.source}). Expected: {self.time:.3g} s on a free core, errors "
+            f"of at most {self.error:.1%} ({parts})."
+        )
+
+    def settled(self, run: Path, cpu_time: float) -> str:
+        """What was got, in words.
+
+        Args:
+            run: the folder of the run, which has ended.
+            cpu_time: what it took of the processor [s]; on a free core that is the wall time.
+        """
+        results = Results.open(run)
+        series, figures = results.time_series, dict(results.summary)
+        figures["peak_force"] = peak_mean(series["time"], series["impact_force_x"], SERIES_INTERVAL)
+        parts = ", ".join(
+            f"{QUANTITIES[name].label} {abs(figures[name] - value) / abs(value):.1%}"
+            for name, value in self.values.items()
+            if figures.get(name) is not None and value
+        )
+        return (
+            f"Got: {cpu_time:.3g} s of the processor, {cpu_time / self.time:.2g} times what was expected "
+            f"({figures['wall_time']:.3g} s by the clock); away from the extrapolated values: {parts}."
+        )
+
+
+def peak_mean(time: Array, force: Array, interval: float) -> float:
+    """Greatest mean of a force over the intervals [s] that follow each other from the start."""
+    ends = np.arange(0.0, time[-1] + 0.5 * interval, interval)
+    return float(np.diff(np.interp(ends, time, cumulative_impulse(time, force))).max() / interval)
+
+
+def percent(text: str) -> float:
+    """An accuracy from `5%`.
+
+    Raises:
+        PurchaseError: it is none from 0.1% to 50%.
+    """
+    found = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*%\s*", text)
+    value = float(found[1]) / 100.0 if found else math.nan
+    if not 0.001 <= value <= 0.5:
+        raise PurchaseError(f"--accuracy {text} must be a percentage from 0.1% to 50%, for instance 5%.")
+    return value
+
+
+def seconds(text: str) -> float:
+    """A budget from `60s`, `10min` or `2h`.
+
+    Raises:
+        PurchaseError: it is no time from 1 s to 1000 h.
+    """
+    found = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|min|h)\s*", text)
+    value = float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2]] if found else math.nan
+    if not 1.0 <= value <= 3.6e6:
+        raise PurchaseError(f"--budget {text} must be a time from 1s to 1000h, for instance 60s or 10min.")
+    return value
+
+
+def buy(
+    scenario: Scenario,
+    *,
+    accuracy: float | None = None,
+    budget: float | None = None,
+    device: str = "cpu",
+    measure: Callable[[Scenario], Result] | None = None,
+    on_probe: Callable[[str], None] = lambda sentence: None,
+) -> Offer:
+    """Choose the spacing that keeps an error, or the best one within a time.
+
+    A scene of which a ladder is shipped needs one coarse run, which tells how fast this machine is; any other is probed
+    by four coarse runs.
+
+    Args:
+        scenario: what will be run; its other settings stay.
+        accuracy: greatest relative error of the key quantities.
+        budget: time of the run [s].
+        device: of the probes and the run.
+        measure: runs a scenario; `warp_mpm.accuracy.measure.measure` but for tests.
+        on_probe: told what is being probed.
+
+    Raises:
+        PurchaseError: it cannot be had; the sentence tells what can.
+    """
+    if measure is None:
+        from warp_mpm.accuracy.measure import measure as measured
+
+        measure = partial(measured, device=device)
+    assert (accuracy is None) != (budget is None)
+    shipped = shipped_ladders().get(scene_key(scenario))
+    default = type(scenario.numerics)()
+    own = scenario.numerics.model_copy(update={"spacing_m": default.spacing_m})
+    if shipped is not None and own == default:
+        coarsest = max(shipped, key=lambda rung: rung.spacing)
+        on_probe(f"This scene was measured before; a run at {coarsest.spacing:g} m tells how fast this machine is.")
+        here = _rung(scenario, coarsest.spacing, measure)
+        rungs, speed = shipped, here.time / coarsest.time
+        source = "from shipped measurements of this scene"
+    else:
+        depth = scenario.flow.depth
+        spacings = [float(f"{depth / cells:.3g}") for cells in PROBE_CELLS]
+        on_probe(f"Probing this scene at spacings of {', '.join(f'{spacing:g}' for spacing in spacings)} m.")
+        rungs, speed = [_rung(scenario, spacing, measure) for spacing in spacings], 1.0
+        source = "from a probe of coarse runs"
+    return choose(rungs, scenario.flow.depth, accuracy=accuracy, budget=budget, speed=speed, source=source)
+
+
+def choose(
+    rungs: Sequence[Rung],
+    depth: float,
+    *,
+    accuracy: float | None = None,
+    budget: float | None = None,
+    speed: float = 1.0,
+    source: str = "",
+) -> Offer:
+    """The offer that a ladder allows; see `buy`.
+
+    Args:
+        rungs: at least three spacings.
+        depth: of the flow [m].
+        speed: time on this machine over that of the ladder.
+    """
+    law = _Law(rungs, speed)
+    coarsest, finest = max(rung.spacing for rung in rungs), depth / FINEST_CELLS
+    spacings = _round_spacings(finest, coarsest)
+    if accuracy is not None:
+        kept = [s for s in spacings if law.error(s) <= accuracy]
+        if not kept:
+            best = spacings[0]
+            raise PurchaseError(
+                f"--accuracy {accuracy:.2%} cannot be promised for this scene: the finest spacing sold, "
+                f"{best:g} m, is expected to keep {law.error(best):.1%} in {law.time(best):.3g} s."
+            )
+        spacing = max(kept)
+    else:
+        assert budget is not None
+        kept = [s for s in spacings if law.time(s) <= budget]
+        if not kept:
+            raise PurchaseError(
+                f"--budget {budget:g}s is too short for this scene: the coarsest spacing sold, {spacings[-1]:g} m, "
+                f"takes {law.time(spacings[-1]):.3g} s."
+            )
+        spacing = min(kept)
+    return Offer(spacing, law.time(spacing), law.errors(spacing), law.values, source)
+
+
+class _Law:
+    """Time and error against the spacing, fitted to a ladder.
+
+    The error is first order in the spacing, f = f0 + a h, by least squares; what a promise rests on is 1.25 |a h| plus
+    the scatter about the line, so that a ladder that wobbles buys less.
+    """
+
+    def __init__(self, rungs: Sequence[Rung], speed: float):
+        h = np.array([rung.spacing for rung in rungs])
+        self._slope, self._scatter = {}, {}
+        self.values: dict[str, float] = {}
+        for name in KEY_QUANTITIES:
+            if not all(name in rung.figures for rung in rungs):
+                continue
+            f = np.array([rung.figures[name] for rung in rungs])
+            basis = np.stack([np.ones_like(h), h], axis=1)
+            (f0, a), *_ = np.linalg.lstsq(basis / h[:, None], f / h, rcond=None)
+            freedom = max(len(h) - 2, 1)
+            self._scatter[name] = float(np.sqrt(((f - basis @ (f0, a)) ** 2).sum() / freedom))
+            self._slope[name], self.values[name] = float(a), float(f0)
+        if not self.values:
+            raise PurchaseError("This scene has no barrier, so it has no figures whose accuracy could be bought.")
+        # Fine runs tell more of finer ones.
+        exponent, self._constant = np.polyfit(np.log(h), np.log([rung.time * speed for rung in rungs]), 1, w=1.0 / h)
+        self._exponent = float(exponent)
+
+    def time(self, spacing: float) -> float:
+        return float(np.exp(self._constant + self._exponent * np.log(spacing))) + OVERHEAD
+
+    def errors(self, spacing: float) -> dict[str, float]:
+        return {
+            name: (SAFETY * abs(self._slope[name]) * spacing + self._scatter[name]) / max(abs(value), 1e-300)
+            for name, value in self.values.items()
+        }
+
+    def error(self, spacing: float) -> float:
+        return max(self.errors(spacing).values())
+
+
+def shipped_ladders() -> dict[str, list[Rung]]:
+    """Ladders of the paper's scenes by the scene's key."""
+    return {key: [Rung(**rung) for rung in one["rungs"]] for key, one in _data()["scenes"].items()}
+
+
+@cache
+def _data() -> dict[str, Any]:
+    file = resources.files("warp_mpm.accuracy") / DATA
+    content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {"scenes": {}}
+    return content
+
+
+def write_data(path: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]], results: Mapping[str, Result]) -> None:
+    """Write the ladders of scenes, as `shipped_ladders` reads them."""
+    content = {
+        "about": "Written by `python -m warp_mpm accuracy SCENARIO... --data FILE`; times are CPU times [s].",
+        "scenes": {},
+    }
+    found: dict[str, Any] = {}
+    for scene, settings in scenes:
+        rungs = [
+            _rung_of(setting.spacing, results[setting.key])
+            for setting in settings
+            if setting.knob == "default" and results[setting.key]["status"] == "finished"
+        ]
+        if len(rungs) >= 3 and rungs[0].figures:
+            found[scene_key(scene)] = {"title": scene.title, "rungs": [rung.__dict__ for rung in rungs]}
+    aside = path.with_name(path.name + ".new")
+    aside.write_text(json.dumps(content | {"scenes": found}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    aside.replace(path)
+
+
+def _rung(scenario: Scenario, spacing: float, measure: Callable[[Scenario], Result]) -> Rung:
+    (setting,) = ladder(scenario, [spacing])
+    result = measure(setting.scenario)
+    if result["status"] != "finished":
+        raise PurchaseError(f"The probe at {spacing:g} m failed: {result['problem']}")
+    return _rung_of(spacing, result)
+
+
+def _rung_of(spacing: float, result: Result) -> Rung:
+    figures = {name: result["figures"].get(name) for name in KEY_QUANTITIES}
+    known = {name: float(f"{value:.7g}") for name, value in figures.items() if value is not None}
+    return Rung(spacing, float(f"{result['cpu_time'] + result['recording_time']:.4g}"), known)
+
+
+def _round_spacings(finest: float, coarsest: float) -> list[float]:
+    """Spacings of two digits from fine to coarse."""
+    steps = range(math.ceil(48 * math.log10(coarsest / finest)) + 1)
+    values = {float(f"{coarsest * 10 ** (-step / 48):.2g}") for step in steps}
+    return sorted(value for value in values if value <= coarsest) or [coarsest]

@@ -1,0 +1,124 @@
+"""Runs the settings of studies on all cores; what was done is not done again."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warp_mpm.accuracy.measure import measure
+from warp_mpm.accuracy.study import Setting
+from warp_mpm.scenario import Scenario
+
+Result = dict[str, Any]
+"""As from `measure`."""
+
+
+@dataclass(frozen=True)
+class StudyProgress:
+    """Where a study stands."""
+
+    done: int
+    running: tuple[str, ...]
+    """Names of the settings that run now."""
+    left: int
+    """Runs not yet begun."""
+    time_left: float | None
+    """Wall time [s] that is left; None until it can be told."""
+
+
+class StudyError(ValueError):
+    """A study that cannot be made; one sentence."""
+
+
+def run_settings(
+    settings: Sequence[Setting],
+    folder: Path,
+    *,
+    jobs: int,
+    on_progress: Callable[[StudyProgress], None] = lambda progress: None,
+) -> dict[str, Result]:
+    """Results of all settings by their keys.
+
+    Each result is written into `folder` as its run ends, under the hash of all that decides its numbers; what is there
+    is not run again. Interrupted, the runs that have not ended are lost, and nothing else.
+
+    Args:
+        settings: what to run.
+        folder: of the results; made if need be.
+        jobs: processes at the same time.
+        on_progress: called as runs begin and end.
+
+    Raises:
+        StudyError: a worker died, for want of memory say.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    found = {key: result for key in {s.key for s in settings} if (result := _read(folder / f"{key}.json")) is not None}
+    # The dearest first, so that no core waits for a long one at the end.
+    waiting = sorted((s for s in settings if s.key not in found), key=_cost)
+    whole, started = sum(map(_cost, waiting)), time.perf_counter()
+    spent, done = 0.0, len(found)
+    on_progress(StudyProgress(done, (), len(waiting), None))
+    if not waiting:
+        return found
+    running: dict[Future[Result], Setting] = {}
+    # Warp's state does not survive a fork.
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                setting = waiting.pop()
+                path = folder / f"{setting.key}.json"
+                running[pool.submit(run_setting, setting.scenario.resolved(), str(path))] = setting
+            elapsed = time.perf_counter() - started
+            left = (whole - spent) * elapsed / spent if spent else None
+            on_progress(StudyProgress(done, tuple(s.name for s in running.values()), len(waiting), left))
+            ended, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in ended:
+                setting = running.pop(future)
+                found[setting.key] = future.result()
+                spent, done = spent + _cost(setting), done + 1
+        on_progress(StudyProgress(done, (), 0, 0.0))
+    except BrokenProcessPool:
+        raise StudyError(
+            f"A run was killed, for want of memory perhaps; the runs that ended are in {folder}, and the same command "
+            "goes on from there, with fewer at a time by --jobs."
+        ) from None
+    finally:
+        processes = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes if running else []:
+            process.terminate()
+    return found
+
+
+def run_setting(scenario: dict[str, Any], path: str) -> Result:
+    """Run one setting in a worker and write its result, whole or not at all."""
+    result = measure(Scenario.model_validate(scenario), profile=True)
+    target = Path(path)
+    aside = target.with_suffix(".new")
+    aside.write_text(json.dumps(result), encoding="utf-8")
+    aside.replace(target)
+    return result
+
+
+def _read(path: Path) -> Result | None:
+    """A result that was written before; None where there is none that can be used."""
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return result if isinstance(result, dict) and "figures" in result else None
+
+
+def _cost(setting: Setting) -> float:
+    """Relative cost of a run: points and steps."""
+    scenario, numerics = setting.scenario, setting.scenario.numerics
+    points = numerics.points_per_cell / numerics.spacing_m**2 * scenario.flow.volume
+    return points * scenario.output.end_time_s / (numerics.courant_number * numerics.spacing_m)

@@ -1,0 +1,269 @@
+"""What a study says: the cheapest choices, what each percent costs, and what each setting and each effect is worth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from warp_mpm.accuracy.errors import QUANTITIES, References, errors, ladder_of, overall, references
+from warp_mpm.accuracy.runner import Result
+from warp_mpm.accuracy.study import DEFAULT, Setting, level_text
+from warp_mpm.scenario import Scenario
+
+TARGETS = (0.10, 0.05, 0.02, 0.01)
+"""Errors whose price is told."""
+
+DEFAULT_TARGET = 0.05
+"""Error of the key quantities that a default spacing should keep."""
+
+
+LADDER = 3
+"""Least number of spacings from which a setting's error is believed."""
+
+NEGLIGIBLE = 0.003
+"""Change of the error that is none."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A setting and what came of it."""
+
+    setting: Setting
+    result: Result
+    errors: dict[str, float]
+    """Relative errors by quantity; empty where the run diverged."""
+    overall: float
+    """Greatest error of the key quantities."""
+
+    @property
+    def time(self) -> float:
+        """CPU time of stepping [s]."""
+        return float(self.result["cpu_time"])
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What leaving an effect out does to the answer and to the time."""
+
+    name: str
+    changes: dict[str, float]
+    """Relative change of each quantity from the whole scene at the same spacing."""
+    time_ratio: float
+    """CPU time over that of the whole scene."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One setting turned alone."""
+
+    name: str
+    level: Any
+    time_ratio: float
+    """CPU time over that of the default at the same spacing."""
+    overall: float
+    """Greatest error of the key quantities, like that of..."""
+    default_overall: float
+    """...the default at the same spacing."""
+    doubt: float
+    """Greatest relative uncertainty of the key quantities' references."""
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        if not math.isfinite(self.overall):
+            return "diverges"
+        # Times of short runs scatter by a tenth.
+        time = "dearer" if self.time_ratio > 1.25 else "cheaper" if self.time_ratio < 0.8 else "no dearer"
+        worse = self.overall - self.default_overall
+        if abs(worse) <= NEGLIGIBLE:
+            return "buys nothing" if time == "dearer" else f"no difference, {time}"
+        if abs(worse) <= self.doubt:
+            return f"{time}, with a difference within the doubt of {self.doubt:.1%}"
+        if worse > 0.0:
+            return f"less accurate, {time}"
+        return f"more accurate, {time}"
+
+
+@dataclass(frozen=True)
+class Study:
+    """The whole of a study, evaluated."""
+
+    scenario: Scenario
+    references: References
+    rows: list[Row]
+    """Without the runs that left an effect out."""
+    effects: list[Effect]
+    knobs: list[Knob]
+    fronts: dict[str, list[Row]] = field(repr=False)
+    """By quantity and for `overall`: the cheapest choices, cheap first."""
+
+    def price(self, name: str, target: float) -> Row | None:
+        """The cheapest setting that keeps an error; None where none does.
+
+        A setting counts by the greatest of its own error and those of the finer ones of its ladder: that two errors
+        cancel at one spacing is no accuracy. No setting keeps less than what the reference is known to.
+        """
+        if self.doubt(name) > target:
+            return None
+        kept = [row for row in self.rows if self._lasting(row, name) <= target]
+        return min(kept, key=lambda row: row.time, default=None)
+
+    def doubt(self, name: str) -> float:
+        """Relative uncertainty of a quantity's reference; for `overall` the greatest of the key quantities'."""
+        if name == "overall":
+            return max(self.references.uncertainty(key) for key in self.references.key_names)
+        return self.references.uncertainty(name)
+
+    @property
+    def recommended_spacing(self) -> float | None:
+        """Coarsest spacing of the scenario's own settings that keeps `DEFAULT_TARGET`, as all finer do [m]; or None."""
+        ladder = [row for row in self.rows if row.setting.knob == DEFAULT]
+        kept = [row.setting.spacing for row in ladder if self._lasting(row, "overall") <= DEFAULT_TARGET]
+        return max(kept, default=None)
+
+    @property
+    def default_beaten_by(self) -> Row | None:
+        """A setting that is cheaper than the scenario's own and more accurate beyond doubt; None: it is on the front.
+
+        CPU times scatter by a few per cent, so a setting must be 10 % cheaper to count.
+        """
+        own = self.scenario.numerics.spacing_m
+        default = next(
+            (r for r in self.rows if r.setting.knob == DEFAULT and r.setting.spacing == own and r.errors), None
+        )
+        if default is None:
+            return None
+        margin = max(self.doubt("overall"), 0.002)
+        better = [
+            row
+            for row in self.rows
+            if row.time < 0.9 * default.time
+            and self._lasting(row, "overall") < self._lasting(default, "overall") - margin
+        ]
+        return min(better, key=lambda row: row.overall, default=None)
+
+    def _lasting(self, row: Row, name: str) -> float:
+        """Greatest error of a setting and of the finer ones of its ladder; infinite where it has no ladder."""
+        if not row.errors:
+            return math.inf
+        peers = [
+            other
+            for other in self.rows
+            if (other.setting.knob, other.setting.level) == (row.setting.knob, row.setting.level)
+        ]
+        if len(peers) < LADDER:
+            return math.inf
+        return max(error_of(other, name) for other in peers if other.setting.spacing <= row.setting.spacing)
+
+
+def error_of(row: Row, name: str) -> float:
+    """Magnitude of a row's error of a quantity or `overall`; infinite where there is none."""
+    return row.overall if name == "overall" else abs(row.errors.get(name, math.inf))
+
+
+def evaluate(scenario: Scenario, settings: Sequence[Setting], results: Mapping[str, Result]) -> Study:
+    """Errors, fronts and prices of a study whose runs are done.
+
+    Raises:
+        ValueError: fewer than three spacings of the scenario's own settings came to their end.
+    """
+    found = references(scenario, ladder_of(settings), results)
+    rows = []
+    for setting in settings:
+        result = results[setting.key]
+        wrong = errors(result, found) if result["status"] == "finished" else {}
+        rows.append(Row(setting, result, wrong, overall(wrong, found)))
+    numeric = [row for row in rows if not row.setting.physics]
+    default = {row.setting.spacing: row for row in numeric if row.setting.knob == DEFAULT}
+    effects = [
+        Effect(row.setting.knob, _changes(row, default[row.setting.spacing], found), _ratio(row, default))
+        for row in rows
+        if row.setting.physics and row.setting.spacing in default and row.errors
+    ]
+    doubt = max((found.uncertainty(name) for name in found.key_names), default=0.0)
+    alone = _turned_alone(numeric)
+    knobs = [
+        Knob(
+            row.setting.knob,
+            row.setting.level,
+            _ratio(row, default),
+            row.overall,
+            default[row.setting.spacing].overall,
+            doubt,
+        )
+        for row in alone
+    ]
+    fronts = {name: front(numeric, name) for name in [*found.names, "overall"]}
+    return Study(scenario, found, numeric, effects, knobs, fronts)
+
+
+def front(rows: Sequence[Row], name: str) -> list[Row]:
+    """The Pareto front of error against time: no other row is both cheaper and more accurate."""
+    kept: list[Row] = []
+    for row in sorted(rows, key=lambda row: row.time):
+        if math.isfinite(error_of(row, name)) and (not kept or error_of(row, name) < error_of(kept[-1], name)):
+            kept.append(row)
+    return kept
+
+
+def sentences(study: Study) -> list[str]:
+    """What a person wants to read off."""
+    said = []
+    names = ["overall", *study.references.key_names, "pore_pressure_max"]
+    for name in names:
+        if name != "overall" and name not in study.references.names:
+            continue
+        label = "the key figures" if name == "overall" else QUANTITIES[name].label
+        prices: list[str] = []
+        for target in TARGETS:
+            row = study.price(name, target)
+            if row is not None and not any(row.setting.name in price for price in prices):
+                prices.append(f"{target:.0%} costs {row.time:.2g} s ({row.setting.name})")
+        best = min((error_of(row, name) for row in study.rows), default=math.inf)
+        answer = "; ".join(prices) if prices else f"no run keeps {TARGETS[0]:.0%}, the best is off by {best:.1%}"
+        said.append(f"{label}: {answer}; the reference is known to {study.doubt(name):.1%}.")
+    for knob in study.knobs:
+        said.append(
+            f"{knob.name} {level_text(knob.level)}: {knob.verdict} ({knob.time_ratio:.2g} times the time, error "
+            f"{_percent(knob.overall)} where the default has {_percent(knob.default_overall)})."
+        )
+    beaten = study.default_beaten_by
+    own = study.scenario.numerics.spacing_m
+    said.append(
+        f"The scenario's own settings (spacing {own:g} m) are on the front."
+        if beaten is None
+        else f"The scenario's own settings (spacing {own:g} m) are beaten by {beaten.setting.name}."
+    )
+    spacing = study.recommended_spacing
+    said.append(
+        f"No spacing of this study keeps {DEFAULT_TARGET:.0%} on the key figures."
+        if spacing is None
+        else f"Recommended spacing: {spacing:g} m, the coarsest that keeps {DEFAULT_TARGET:.0%} on the key figures, as "
+        "all finer ones do."
+    )
+    return said
+
+
+def _turned_alone(rows: Sequence[Row]) -> list[Row]:
+    """The rows of knobs turned at one spacing; of a knob that has a ladder, the row at that spacing."""
+    at = {row.setting.spacing for row in rows if row.setting.knob == "courant_number"}
+    single = [row.setting for row in rows if row.setting.knob == "drag"]
+    return [row for row in rows if row.setting.knob != DEFAULT and (row.setting.spacing in at or row.setting in single)]
+
+
+def _percent(value: float) -> str:
+    return f"{value:.1%}" if math.isfinite(value) else "none"
+
+
+def _ratio(row: Row, default: Mapping[float, Row]) -> float:
+    return row.time / max(default[row.setting.spacing].time, 1e-9)
+
+
+def _changes(row: Row, whole: Row, found: References) -> dict[str, float]:
+    return {
+        name: row.errors[name] - whole.errors[name]
+        for name in found.scalars
+        if name in row.errors and name in whole.errors
+    }

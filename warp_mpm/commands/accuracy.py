@@ -1,0 +1,141 @@
+"""`python -m warp_mpm accuracy`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from warp_mpm.commands.refusals import complain, refusals
+
+if TYPE_CHECKING:
+    from warp_mpm.accuracy.purchase import Offer
+    from warp_mpm.accuracy.runner import StudyProgress
+    from warp_mpm.scenario import Scenario
+
+INTERRUPTED = 130
+
+
+def accuracy(
+    scenarios: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SCENARIO...",
+            help="Scenario files. One: the whole study; several: a ladder of spacings of each, beside the closed form.",
+            show_default=False,
+        ),
+    ],
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, and coarser ones.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of tables and pictures.", show_default="runs/accuracy/NAME"),
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="End time in seconds.", show_default="that of the scenario")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Runs at a time.", show_default="number of cores")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write what `run --accuracy` needs to know of these scenes.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Measure what accuracy costs in time: error against time over the settings that matter.
+
+    The folder then holds study.md (what it says, all runs, the price of each effect, the price of the closed form),
+    runs.csv, and pictures. The same command again runs only what is missing; what was run is found by the hash of
+    scene, settings and program.
+
+    Exit codes: 0 done, 2 the input cannot be used, 130 interrupted.
+    """
+    with refusals():
+        from warp_mpm.accuracy.report import write_ladders, write_study
+        from warp_mpm.accuracy.runner import run_settings
+        from warp_mpm.accuracy.study import FULL_SPACINGS, QUICK_SPACINGS, ladder, plan
+        from warp_mpm.scenario import Scenario
+
+        changes = {} if until is None else {"output.end_time_s": until}
+        scenes = [Scenario.load(path).replaced(changes) for path in scenarios]
+        name = scenarios[0].stem if len(scenes) == 1 else "ladders"
+        folder = out if out is not None else Path("runs/accuracy") / name
+        if data is not None and not data.parent.is_dir():
+            raise ValueError(f"--data {data} must be a file in a folder that exists.")
+        if len(scenes) == 1:
+            plans = [plan(scenes[0], quick=quick)]
+        else:
+            factors = QUICK_SPACINGS if quick else FULL_SPACINGS
+            plans = [ladder(scene, [factor * scene.numerics.spacing_m for factor in factors]) for scene in scenes]
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with _progress(sum(map(len, plans))) as show:
+                results = run_settings(
+                    [setting for settings in plans for setting in settings],
+                    folder / "results",
+                    jobs=jobs or os.cpu_count() or 1,
+                    on_progress=show,
+                )
+        except KeyboardInterrupt:
+            complain(f"Interrupted; the runs that ended are in {folder}. The same command goes on from there.")
+            raise typer.Exit(INTERRUPTED) from None
+        if len(scenes) == 1:
+            for sentence in write_study(folder, scenes[0], plans[0], results):
+                typer.echo(sentence)
+        else:
+            write_ladders(folder, list(zip(scenes, plans, strict=True)), results)
+        if data is not None:
+            from warp_mpm.accuracy.purchase import write_data
+
+            write_data(data, list(zip(scenes, plans, strict=True)), results)
+        typer.echo(f"Tables and pictures: {folder}", err=True)
+
+
+def bought(
+    scenario: Scenario, accuracy: str | None, budget: str | None, device: str, *, quiet: bool
+) -> tuple[Offer, Scenario]:
+    """What `run --accuracy` or `run --budget` buys, and the scenario with the spacing that was chosen.
+
+    Raises:
+        typer.Exit: 2, after one sentence, where it cannot be had.
+    """
+    with refusals():
+        from warp_mpm.accuracy.purchase import buy, percent, seconds
+
+        say = (lambda sentence: None) if quiet else (lambda sentence: typer.echo(sentence, err=True))
+        offer = buy(
+            scenario,
+            accuracy=None if accuracy is None else percent(accuracy),
+            budget=None if budget is None else seconds(budget),
+            device=device,
+            on_probe=say,
+        )
+        say(offer.described())
+        return offer, scenario.replaced({"numerics.spacing_m": offer.spacing})
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[StudyProgress], None]]:
+    """A bar on a terminal; elsewhere a line for every run that ends."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True, highlight=False, markup=False)
+    columns = (BarColumn(bar_width=30), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=total)
+
+        def show(progress: StudyProgress) -> None:
+            left = "" if progress.time_left is None else f", about {progress.time_left:.0f} s to go"
+            text = f"{progress.done} done, {len(progress.running)} running, {progress.left} left{left}"
+            bar.update(task, completed=progress.done, description=text)
+            if not console.is_terminal:
+                running = f" ({'; '.join(progress.running)})" if progress.running else ""
+                console.print(text + running, soft_wrap=True)
+
+        yield show
