@@ -4,6 +4,7 @@ Blocks marked `console` are for other machines (a cluster, a GPU) or take long; 
 a title is saved under that name, as the page asks its reader to do. Pages that run many scenes are marked slow.
 """
 
+import json
 import os
 import re
 import shlex
@@ -82,3 +83,21 @@ def test_navigation_leads_to_pages():
     assert len(listed) > 15
     for page in listed:
         assert (ROOT / "docs" / page).is_file(), page
+
+
+def test_notebook_runs(folder):
+    """Its cells one after the other, as a notebook runs them; Jupyter itself is not needed for that."""
+    cells = json.loads((ROOT / "docs/notebook.ipynb").read_text())["cells"]
+    lines = [line for cell in cells if cell["cell_type"] == "code" for line in [*cell["source"], "\n"]]
+    program = "\n".join(line.rstrip("\n") for line in lines if not line.startswith("%"))
+    answer = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert "lambda" in answer.stdout
