@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import typer
 
+from warp_mpm.commands.accuracy import accuracy
 from warp_mpm.commands.animate import animate
 from warp_mpm.commands.hard_cases import hard_cases
 from warp_mpm.commands.plan import plan
@@ -24,6 +25,7 @@ EXAMPLES: dict[Callable[..., None], str] = {
     ),
     animate: "Example: python -m warp_mpm animate runs/set_iib --out set_iib.mp4 --field pore_pressure --speed 0.5",
     sweep: "Example: python -m warp_mpm sweep docs/sweeps/barrier_mass.json --out runs/barrier_mass --workers 2",
+    accuracy: "Example: python -m warp_mpm accuracy scenarios/case_1.json --quick",
     hard_cases: "Example: python -m warp_mpm hard-cases --quick --only speed_50 --only falling_jet",
     plan: "Example: python -m warp_mpm plan scenarios/case_1.json --what-if",
 }
