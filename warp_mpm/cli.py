@@ -180,7 +180,7 @@ def run(
     else:
         display.summarize(outcome)
     if offer is not None and outcome.finished and not quiet:
-        typer.echo(offer.settled(folder, time.process_time() - bought_at))
+        typer.echo(offer.settled(folder, time.process_time() - bought_at), err=True)
     if not outcome.finished:
         _complain(
             f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "

@@ -54,8 +54,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 KEY_QUANTITIES = ("peak_force", "impulse", "barrier_displacement_final")
 """What a design needs; their greatest error is the error of a setting as a whole."""
 
-SAFETY, POOR_SAFETY = 1.25, 3.0
-"""Factors on an extrapolation whose order of convergence was observed, or not (Roache's grid convergence index)."""
+SAFETY = 1.25
+"""Factor on an extrapolation whose order of convergence was observed (Roache's grid convergence index)."""
+
+DRIFT = 2.0
+"""Factor on the spread of the three finest runs where they still drift one way: what is left of an order of 0.6 over
+spacings that halve."""
 
 ORDERS = (0.5, 2.0)
 """Orders of convergence that are believed when observed (Eça and Hoekstra 2014)."""
@@ -77,8 +81,8 @@ def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Reference
 
     Where the observed p lies in `ORDERS`, f0 is the answer, and its uncertainty 1.25 times the distance to the finest
     run, plus the scatter about the fit. Where it does not, the finest run itself is the answer, with the spread of the
-    last three values as its uncertainty: a ladder without order gives no reason to go beyond it. (Eça and Hoekstra,
-    J. Comput. Phys. 262, 2014, simplified.)
+    last three values as its uncertainty, twice that where they still drift one way: a ladder without order gives no
+    reason to go beyond it. (Eça and Hoekstra, J. Comput. Phys. 262, 2014, simplified.)
 
     Raises:
         ValueError: fewer than three values.
@@ -103,7 +107,8 @@ def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Reference
     # A fit that explains less than half of what varies has not seen an order.
     if ORDERS[0] <= best <= ORDERS[1] and scatter < 0.25 * float(np.ptp(f)) and abs(change) > scatter:
         return Reference(f0, SAFETY * abs(f[0] - f0) + scatter, best)
-    return Reference(float(f[0]), spread, None)
+    drifting = (f[1] - f[0]) * (f[2] - f[1]) > 0.0
+    return Reference(float(f[0]), DRIFT * spread if drifting else spread, None)
 
 
 @dataclass(frozen=True)

@@ -311,4 +311,4 @@ def _round_spacings(finest: float, coarsest: float) -> list[float]:
     """Spacings of two digits from fine to coarse."""
     steps = range(math.ceil(48 * math.log10(coarsest / finest)) + 1)
     values = {float(f"{coarsest * 10 ** (-step / 48):.2g}") for step in steps}
-    return sorted(value for value in values if value <= coarsest) or [coarsest]
+    return sorted(value for value in values if finest <= value <= coarsest) or [coarsest]

@@ -18,6 +18,9 @@ SERIES_INTERVAL = 0.01
 QUICK_SPACINGS, FULL_SPACINGS = (2.0, 1.5, 1.0, 0.75), (2.0, 1.5, 1.0, 0.75, 0.5, 0.375)
 """Spacings of the ladders over the scenario's own."""
 
+COARSE_SPACINGS = (2.5, 2.0, 1.5, 1.0)
+"""The same for many scenes at once."""
+
 COMBINATION_SPACINGS = (2.0, 1.5, 1.0)
 """Spacings of the ladders with one other setting changed, over the scenario's own."""
 

@@ -58,7 +58,7 @@ def accuracy(
     with refusals():
         from warp_mpm.accuracy.report import write_ladders, write_study
         from warp_mpm.accuracy.runner import run_settings
-        from warp_mpm.accuracy.study import FULL_SPACINGS, QUICK_SPACINGS, ladder, plan
+        from warp_mpm.accuracy.study import COARSE_SPACINGS, FULL_SPACINGS, ladder, plan
         from warp_mpm.scenario import Scenario
 
         changes = {} if until is None else {"output.end_time_s": until}
@@ -70,7 +70,7 @@ def accuracy(
         if len(scenes) == 1:
             plans = [plan(scenes[0], quick=quick)]
         else:
-            factors = QUICK_SPACINGS if quick else FULL_SPACINGS
+            factors = COARSE_SPACINGS if quick else FULL_SPACINGS
             plans = [ladder(scene, [factor * scene.numerics.spacing_m for factor in factors]) for scene in scenes]
         folder.mkdir(parents=True, exist_ok=True)
         try:

@@ -1,0 +1,272 @@
+"""Studies of accuracy: what is planned, how errors and prices are told, what is bought."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warp_mpm.accuracy.errors import errors, extrapolate, references
+from warp_mpm.accuracy.measure import measure
+from warp_mpm.accuracy.purchase import PurchaseError, Rung, buy, choose, peak_mean, percent, seconds
+from warp_mpm.accuracy.runner import StudyProgress, run_settings
+from warp_mpm.accuracy.study import COMBINATIONS, DEFAULT, KNOBS, ladder, plan, run_key, scene_key
+from warp_mpm.accuracy.tables import csv_table, markdown
+from warp_mpm.accuracy.verdict import evaluate, front
+from warp_mpm.scenario import Scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scenario:
+    return Scenario.load(SCENARIOS / "case_1.json").replaced({"numerics.spacing_m": 0.4, "output.end_time_s": 1.0})
+
+
+def made_up(scenario: Scenario, *, order: float = 1.0, wobble: float = 0.0) -> dict[str, Any]:
+    """A result that follows a law: f = f0 (1 + 0.1 h^order), and time that falls with the cube of the spacing."""
+    numerics = scenario.numerics
+    off = 0.1 * numerics.spacing_m**order + wobble
+    if numerics.points_per_cell == 1:
+        off += 0.2
+    time = [0.0, 0.5, 1.0]
+    cost = numerics.points_per_cell / 4.0 * 0.95 / numerics.courant_number / numerics.spacing_m**3
+    return {
+        "status": "finished",
+        "problem": None,
+        "cpu_time": cost,
+        "recording_time": 0.0,
+        "preparation_time": 0.1,
+        "wall_time": cost,
+        "steps": 10,
+        "material_points": 20,
+        "figures": {
+            "peak_force": 4e5 * (1 + off),
+            "impulse": 1e6 * (1 + off),
+            "impact_duration": 2.0,
+            "peak_force_time": 0.5,
+            "barrier_displacement_final": 1.3 * (1 + off),
+            "pore_pressure_max": 1e5 * (1 + off),
+            "overtopped_volume": 4.0,
+        },
+        "curves": {
+            "time": time,
+            "impact_force_x": [0.0, 4e5 * (1 + off), 1e5],
+            "flow_kinetic_energy": [4e6, 2e6 * (1 + off), 1e5],
+            "barrier_displacement": [0.0, 0.5 * (1 + off), 1.3 * (1 + off)],
+        },
+        "kernel_times": {"scatter": 0.6, "gather": 0.4},
+    }
+
+
+class TestExtrapolation:
+    @pytest.mark.parametrize("order", [0.7, 1.0, 1.8])
+    def test_finds_limit_and_order_of_an_exact_law(self, order: float) -> None:
+        spacings = [0.4, 0.3, 0.2, 0.15]
+        reference = extrapolate(spacings, [5.0 + 2.0 * h**order for h in spacings])
+        assert reference.order == pytest.approx(order, abs=0.01)  # tolerance of the bounded search
+        assert reference.value == pytest.approx(5.0, abs=0.01)
+        assert abs(reference.value - 5.0) <= reference.uncertainty
+
+    def test_does_not_extrapolate_what_wobbles(self) -> None:
+        reference = extrapolate([0.4, 0.3, 0.2, 0.15], [1.0, 1.2, 0.9, 1.1])
+        assert reference.order is None
+        assert reference.value == 1.1
+        assert reference.uncertainty == pytest.approx(0.3)  # spread of the three finest: 0.9 to 1.2
+
+    def test_uncertainty_covers_the_truth_in_nine_ladders_of_ten(self) -> None:
+        random = np.random.default_rng(7)
+        spacings = np.array([0.4, 0.3, 0.2, 0.15])
+        covered = 0
+        for _ in range(200):
+            order, slope = random.uniform(0.6, 1.9), random.uniform(0.5, 2.0)
+            values = 10.0 + slope * spacings**order + random.normal(0.0, 0.01, 4)
+            reference = extrapolate(spacings, values)
+            covered += abs(reference.value - 10.0) <= reference.uncertainty
+        assert covered >= 180
+
+    def test_needs_three(self) -> None:
+        with pytest.raises(ValueError, match="three"):
+            extrapolate([0.4, 0.2], [1.0, 2.0])
+
+
+class TestPlan:
+    def test_holds_every_knob_a_ladder_and_every_effect_once(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        assert {s.knob for s in settings if not s.physics} == {DEFAULT, *KNOBS}
+        assert {s.knob for s in settings if s.physics} == {"undrained", "dry", "elastic", "fixed"}
+        assert [s.spacing for s in settings if s.knob == DEFAULT] == [0.8, 0.6, 0.4, 0.3]
+        for knob, level in COMBINATIONS:
+            assert sorted(s.spacing for s in settings if (s.knob, s.level) == (knob, level)) == [0.4, 0.6, 0.8]
+        assert len({s.key for s in settings}) == len(settings)
+
+    def test_full_study_holds_what_the_quick_one_says(self, scene: Scenario) -> None:
+        quick, full = plan(scene, quick=True), plan(scene, quick=False)
+        assert len(full) > len(quick)
+        assert {s.key for s in quick if s.knob == DEFAULT} <= {s.key for s in full}
+
+    def test_dry_scene_turns_no_drag(self) -> None:
+        settings = plan(Scenario.load(SCENARIOS / "case_1_dry.json"), quick=True)
+        assert not {"drag", "dry", "undrained"} & {s.knob for s in settings}
+
+    def test_scene_without_an_effect_is_the_paper_s(self, scene: Scenario) -> None:
+        dry = next(s for s in plan(scene, quick=True) if s.knob == "dry").scenario
+        own = Scenario.load(SCENARIOS / "case_1_dry.json")
+        assert dry.flow == own.flow
+
+    def test_key_tells_numbers_apart_and_nothing_else(self, scene: Scenario) -> None:
+        assert run_key(scene) == run_key(scene.replaced({"title": "other"}))
+        assert run_key(scene) != run_key(scene.replaced({"numerics.courant_number": 0.5}))
+        assert scene_key(scene) == scene_key(scene.replaced({"numerics.spacing_m": 0.2}))
+        assert scene_key(scene) != scene_key(scene.replaced({"output.end_time_s": 2.0}))
+
+
+class TestVerdict:
+    def test_errors_prices_and_front(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        ladder_rows = {row.setting.spacing: row for row in study.rows if row.setting.knob == DEFAULT}
+        # The law's error at spacing h is 0.1 h; the search for the order ends within 0.01.
+        assert ladder_rows[0.8].errors["peak_force"] == pytest.approx(0.08, abs=1e-3)
+        assert study.references.scalars["peak_force"].value == pytest.approx(4e5, rel=1e-3)
+        price = study.price("peak_force", 0.05)
+        assert price is not None
+        assert (price.setting.knob, price.setting.spacing) == (DEFAULT, 0.4)
+        # 0.08, 0.06, 0.04, 0.03: 0.4 m is the coarsest below 5 %.
+        assert study.recommended_spacing == 0.4
+        assert study.default_beaten_by is None
+        times = [row.time for row in study.fronts["overall"]]
+        wrong = [row.overall for row in study.fronts["overall"]]
+        assert times == sorted(times)
+        assert wrong == sorted(wrong, reverse=True)
+        one_point = next(k for k in study.knobs if (k.name, k.level) == ("points_per_cell", 1))
+        assert one_point.verdict.startswith("less accurate")
+        many = next(k for k in study.knobs if (k.name, k.level) == ("points_per_cell", 16))
+        assert many.verdict == "buys nothing"
+
+    def test_error_that_cancels_once_buys_nothing(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        # Exact on the coarsest grid by accident, wrong by several per cent on the others.
+        results = {s.key: made_up(s.scenario, wobble=-0.08 if s.spacing == 0.8 else 0.0) for s in settings}
+        study = evaluate(scene, settings, results)
+        price = study.price("peak_force", 0.1)
+        assert price is None or price.setting.spacing < 0.8 or study.doubt("peak_force") <= 0.1
+        cheapest = front(study.rows, "peak_force")[0]
+        assert cheapest.setting.spacing == 0.8  # it is on the front all the same
+        assert study.price("peak_force", 0.005) is None
+
+    def test_run_that_diverged_has_no_error_and_stops_nothing(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        results = {s.key: made_up(s.scenario) for s in settings}
+        lost = next(s for s in settings if s.knob == "transfer")
+        results[lost.key] |= {"status": "diverged", "problem": "it did", "figures": {}, "curves": {}}
+        study = evaluate(scene, settings, results)
+        row = next(row for row in study.rows if row.setting.key == lost.key)
+        assert math.isinf(row.overall)
+        assert row not in study.fronts["overall"]
+        assert "diverged" in markdown(study, [])
+
+    def test_reference_run_is_off_by_what_it_is_not_known_to(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        shift = {0.8: 0.0, 0.6: 0.1, 0.4: -0.1, 0.3: 0.05}
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=shift[s.spacing]) for s in settings}
+        known = references(scene, settings, results)
+        assert known.scalars["impulse"].order is None
+        assert errors(results[settings[-1].key], known)["impulse"] == known.uncertainty("impulse") > 0.1
+
+    def test_table_has_a_line_for_every_run(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        lines = csv_table(study).splitlines()
+        assert len(lines) == 1 + sum(not s.physics for s in settings)
+        assert len({len(re.findall(r',(?=(?:[^"]*"[^"]*")*[^"]*$)', line)) for line in lines}) == 1
+
+
+class TestPurchase:
+    LADDER = tuple(
+        Rung(h, 0.02 / h**3, {"peak_force": 4e5 * (1 + 0.2 * h), "impulse": 1e6 * (1 - 0.1 * h)})
+        for h in (0.5, 0.375, 0.27, 0.2)
+    )
+
+    def test_keeps_the_promise_on_a_law(self) -> None:
+        offer = choose(self.LADDER, 3.0, accuracy=0.02)
+        assert 0.2 * offer.spacing <= 0.02
+        # 1.25 for safety: no finer than that asks for, but for the two digits of a spacing.
+        assert 0.2 * offer.spacing * 1.25 == pytest.approx(0.02, rel=0.07)
+        assert offer.values["peak_force"] == pytest.approx(4e5)
+
+    def test_fills_the_budget(self) -> None:
+        offer = choose(self.LADDER, 3.0, budget=60.0)
+        assert 45.0 < offer.time <= 60.0
+        assert choose(self.LADDER, 3.0, budget=60.0, speed=2.0).spacing > offer.spacing
+
+    def test_says_what_can_be_had(self) -> None:
+        with pytest.raises(PurchaseError, match=r"finest spacing sold, 0\.026 m"):
+            choose(self.LADDER, 3.0, accuracy=0.001)
+        with pytest.raises(PurchaseError, match=r"coarsest spacing sold, 0\.5 m"):
+            choose(self.LADDER, 3.0, budget=1.0)
+
+    @pytest.mark.parametrize("text", ["5", "0%", "200%", "five", "nan%"])
+    def test_refuses_what_is_no_percentage(self, text: str) -> None:
+        with pytest.raises(PurchaseError, match=re.escape(f"--accuracy {text}")):
+            percent(text)
+
+    def test_reads_percentages_and_times(self) -> None:
+        assert percent(" 5 %") == pytest.approx(0.05)
+        assert seconds("1.5min") == 90.0
+        with pytest.raises(PurchaseError, match="--budget 60"):
+            seconds("60")
+
+    def test_another_scene_is_probed(self, scene: Scenario) -> None:
+        probed: list[float] = []
+
+        def law(scenario: Scenario) -> dict[str, Any]:
+            probed.append(scenario.numerics.spacing_m)
+            return made_up(scenario)
+
+        offer = buy(scene.replaced({"flow.velocity_m_per_s": [9.3, 0.0]}), accuracy=0.02, measure=law)
+        assert len(probed) == 4
+        assert 0.1 * offer.spacing <= 0.02
+
+    def test_peak_mean_does_not_depend_on_the_series(self) -> None:
+        time = np.linspace(0.0, 1.0, 201)
+        force = np.sin(7.0 * time)
+        halves = 0.5 * (force[1::2] + force[2::2])
+        assert peak_mean(time, force, 0.01) == pytest.approx(halves.max(), rel=1e-12)
+
+
+class TestRunner:
+    def test_runs_once_and_goes_on_where_it_stopped(self, scene: Scenario, tmp_path: Path) -> None:
+        short = scene.replaced({"output.end_time_s": 0.05, "numerics.spacing_m": 0.8})
+        settings = ladder(short, [1.0, 0.8])
+        seen: list[StudyProgress] = []
+        first = run_settings(settings, tmp_path, jobs=1, on_progress=seen.append)
+        assert (seen[-1].done, seen[-1].left) == (2, 0)
+        assert all(p.done + len(p.running) + p.left == 2 for p in seen)
+        (tmp_path / f"{settings[0].key}.json").unlink()
+        (tmp_path / f"{settings[1].key}.json").write_text(json.dumps(first[settings[1].key] | {"steps": -1}))
+        second = run_settings(settings, tmp_path, jobs=1)
+        assert second[settings[1].key]["steps"] == -1  # read, not run
+        assert second[settings[0].key]["figures"] == first[settings[0].key]["figures"]
+
+    def test_damaged_result_is_run_again(self, scene: Scenario, tmp_path: Path) -> None:
+        (setting,) = ladder(scene.replaced({"output.end_time_s": 0.02}), [1.0])
+        (tmp_path / f"{setting.key}.json").write_text("{")
+        assert run_settings([setting], tmp_path, jobs=1)[setting.key]["status"] == "finished"
+
+    def test_measure_tells_figures_curves_and_times(self, scene: Scenario) -> None:
+        result = measure(scene.replaced({"output.end_time_s": 0.5, "numerics.spacing_m": 0.8}), profile=True)
+        assert result["status"] == "finished"
+        assert (
+            result["figures"]["barrier_displacement_final"] == result["curves"]["barrier_displacement"][-1]
+            or abs(result["figures"]["barrier_displacement_final"] - result["curves"]["barrier_displacement"][-1])
+            < 1e-6 * result["figures"]["barrier_displacement_final"]
+        )
+        assert sum(result["kernel_times"].values()) == pytest.approx(1.0)
+        assert result["cpu_time"] > 0.0
+        json.dumps(result)
