@@ -1,0 +1,68 @@
+"""`python -m warp_mpm validate`."""
+
+from __future__ import annotations
+
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SHORT = 1
+"""Exit code when a case misses its limit."""
+
+
+def validate(
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this case; may be given again.", show_default=False)
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser or shorter variants of most cases.")] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and its plots.")] = Path(
+        "runs/validation"
+    ),
+) -> None:
+    """Run the cases whose answers are known, and write a page of ours beside the reference.
+
+    The folder then holds validation.md and, in validation/, a plot of each case. Every case has a limit; a number that
+    misses it stays on the page as short, with the reason.
+
+    Exit codes: 0 all within their limits, 1 some fall short, 2 the input cannot be used.
+    """
+    from rich.console import Console
+
+    from warp_mpm.commands.refusals import refusals
+    from warp_mpm.validation import catalogue, page
+
+    with refusals():
+        cases = catalogue.chosen(only, quick=quick)
+        (out / page.PICTURES).mkdir(parents=True, exist_ok=True)
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 160
+    results = []
+    for case in cases:
+        with console.status(f"{case.name} ..."):
+            begin = time.perf_counter()
+            outcome = case.run(quick)
+            results.append(page.Result(case, outcome, time.perf_counter() - begin))
+        console.print(f"{case.title}  ({results[-1].seconds:.1f} s)", style="bold")
+        console.print(page.check_table(outcome))
+        with refusals():
+            written = page.write(out, results, quick=quick, versions=_versions())
+    console.print(page.summary_table(results))
+    console.print(f"The page is {written}", soft_wrap=True)
+    if any(result.outcome.short for result in results):
+        raise typer.Exit(SHORT)
+
+
+def _versions() -> str:
+    """Versions of what computed the page."""
+    names = ("warp-mpm-impact", "warp-lang", "numpy")
+    found = []
+    for name in names:
+        try:
+            found.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            found.append(name)
+    return ", ".join(found)

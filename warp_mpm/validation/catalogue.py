@@ -1,0 +1,33 @@
+"""All validation cases, in the order of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from warp_mpm.validation import columns, contact, elements, granular, jets, phases, shallow_water
+from warp_mpm.validation.case import Case
+
+CASES: tuple[Case, ...] = (
+    *elements.CASES,
+    *columns.CASES,
+    *phases.CASES,
+    *contact.CASES,
+    *jets.CASES,
+    *shallow_water.CASES,
+    *granular.CASES,
+)
+
+
+def chosen(names: Sequence[str] | None, *, quick: bool) -> list[Case]:
+    """The cases of these names, or all of them; a quick run without names leaves out what has no quick variant.
+
+    Raises:
+        ValueError: a name is unknown.
+    """
+    known = {case.name: case for case in CASES}
+    for name in names or ():
+        if name not in known:
+            raise ValueError(f"--only {name} is no validation case; it must be one of {', '.join(known)}.")
+    if names:
+        return [known[name] for name in dict.fromkeys(names)]
+    return [case for case in CASES if case.in_quick or not quick]

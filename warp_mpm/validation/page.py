@@ -1,0 +1,208 @@
+"""The page of a validation: Markdown with one plot per case, and the table in the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from warp_mpm.plotting.style import GREY, RUN_COLOURS, grid, save
+from warp_mpm.validation.case import Case, Check, Outcome, Panel, number
+
+PAGE = "validation.md"
+PICTURES = "validation"
+
+INTRODUCTION = """\
+# Validation
+
+The simulator against closed-form solutions, against experiments, against the paper, and against itself as it is
+refined. `python -m warp_mpm validate` computes every number and every picture of this page; `--only NAME` runs one
+case, `--quick` coarser or shorter variants of most.
+
+A limit belongs to the case, not to the result: what misses it stays here as **short**, with the reason. Errors are
+differences from the reference, as shares of it unless the table says otherwise. Curves of the reference are dashed and
+grey.
+"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A case, what came of it, and how long it took [s]."""
+
+    case: Case
+    outcome: Outcome
+    seconds: float
+
+
+# -- the page ----------------------------------------------------------------------------------------------------
+
+
+def write(folder: Path, results: Sequence[Result], *, quick: bool, versions: str) -> Path:
+    """Write the page and its pictures into `folder`; returns the page's path."""
+    pictures = folder / PICTURES
+    pictures.mkdir(parents=True, exist_ok=True)
+    lines = [INTRODUCTION]
+    how = "quick variants" if quick else "full variants"
+    lines.append(f"Computed with {versions}; {how}, {sum(result.seconds for result in results):.0f} s on one core.\n")
+    lines.append("| case | verdict | largest error over its limit | time |\n| --- | --- | --- | --- |")
+    for result in results:
+        lines.append(
+            f"| [{result.case.title}](#{_anchor(result.case.title)}) | {verdict(result.outcome)} | "
+            f"{_worst(result.outcome)} | {result.seconds:.0f} s |"
+        )
+    for result in results:
+        lines += ["", *_section(result, pictures)]
+    page = folder / PAGE
+    aside = page.with_name(page.name + ".new")
+    aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    aside.replace(page)
+    return page
+
+
+def _anchor(title: str) -> str:
+    """The anchor that Markdown readers make of a heading."""
+    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
+
+
+def _section(result: Result, pictures: Path) -> list[str]:
+    case, outcome = result.case, result.outcome
+    lines = [
+        f"## {case.title}",
+        "",
+        case.tests,
+        "",
+        f"Reference: {case.source}. Limit: {case.limit}. Run alone: `--only {case.name}`.",
+        "",
+    ]
+    for remark in outcome.remarks:
+        lines += [remark, ""]
+    if outcome.panels:
+        save(drawn(outcome.panels), pictures / f"{case.name}.png")
+        lines += [f"![{case.title}]({PICTURES}/{case.name}.png)", ""]
+    for name, figure in outcome.pictures.items():
+        save(figure, pictures / f"{case.name}-{name}.png")
+        lines += [f"![{name.replace('-', ' ')}]({PICTURES}/{case.name}-{name}.png)", ""]
+    if outcome.checks:
+        lines += ["| | quantity | ours | reference | error | limit |", "| --- | --- | --- | --- | --- | --- |"]
+        for check in outcome.checks:
+            lines.append(f"| {' | '.join(_cells(check))} |")
+        lines.append("")
+    reasons = dict.fromkeys(check.remark for check in outcome.checks if check.remark and check.passed is not True)
+    for reason in reasons:
+        which = [check for check in outcome.checks if check.remark == reason and check.passed is not True]
+        mark = "Short" if any(check.passed is False for check in which) else "Note"
+        names = "; ".join(check.quantity for check in which)
+        lines += [f"*{mark}* ({names}): {reason}.", ""]
+    for table in outcome.tables:
+        lines += [f"**{table.title}**", "", f"| {' | '.join(table.columns)} |", "| --- " * len(table.columns) + "|"]
+        lines += [f"| {' | '.join(row)} |" for row in table.rows]
+        lines.append("")
+    return lines[:-1]
+
+
+def _cells(check: Check) -> list[str]:
+    return [
+        {True: "ok", False: "**short**", None: ""}[check.passed],
+        check.quantity,
+        f"{number(check.ours)} {check.unit.replace('-', '') if check.unit == '-' else check.unit}".strip(),
+        check.reference,
+        "" if check.error is None else _share(check.error, check),
+        "" if check.limit is None else _share(check.limit, check),
+    ]
+
+
+def _share(value: float, check: Check) -> str:
+    smallest = check.limit if check.limit is not None else value
+    if check.percent and (smallest >= 1e-3 or smallest == 0.0):
+        return f"{100.0 * value:.2g} %"
+    return f"{value:.2g}"
+
+
+def verdict(outcome: Outcome) -> str:
+    """`ok`, `short` with the number of checks that are, or `reported`."""
+    if outcome.short:
+        return f"**short** ({len(outcome.short)} of {len(outcome.checks)})"
+    return "ok" if any(check.passed for check in outcome.checks) else "reported"
+
+
+def _worst(outcome: Outcome) -> str:
+    """The largest error over its limit among the checks that have one."""
+    shares = [check.error / check.limit for check in outcome.checks if check.error is not None and check.limit]
+    return f"{max(shares):.2g}" if shares else ""
+
+
+# -- plots -------------------------------------------------------------------------------------------------------
+
+
+def drawn(panels: Sequence[Panel]) -> Figure:
+    """All panels of a case, two in a row."""
+    columns = min(len(panels), 2)
+    rows = math.ceil(len(panels) / columns)
+    figure = Figure(figsize=(5.2 * columns, 3.3 * rows), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for panel, place in zip(panels, axes, strict=False):
+        _draw(place, panel)
+    for place in axes[len(panels) :]:
+        place.set_visible(False)
+    return figure
+
+
+def _draw(place: Axes, panel: Panel) -> None:
+    colours = iter(RUN_COLOURS * 4)
+    for curve in panel.curves:
+        label = curve.label or None
+        if curve.style == "reference":
+            place.plot(curve.x, curve.y, color=GREY, linestyle="--", linewidth=1.6, label=label, zorder=1)
+        elif curve.style[0].isalpha() and curve.style[0] in "kbr":
+            colour = {"k": "#000000", "b": RUN_COLOURS[0], "r": RUN_COLOURS[1]}[curve.style[0]]
+            place.plot(curve.x, curve.y, curve.style[1:], color=colour, label=label, linewidth=1.2, markersize=4)
+        else:
+            place.plot(curve.x, curve.y, curve.style, color=next(colours), label=label, linewidth=1.2, markersize=4)
+    place.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+    place.title.set_fontsize(10)
+    if panel.log_x:
+        place.set_xscale("log")
+    if panel.log_y:
+        place.set_yscale("log")
+    grid(place)
+    if any(curve.label for curve in panel.curves):
+        place.legend(fontsize=8)
+
+
+# -- the terminal ------------------------------------------------------------------------------------------------
+
+
+def summary_table(results: Sequence[Result]) -> RichTable:
+    """One line per case."""
+    table = RichTable(box=None, padding=(0, 2, 0, 0))
+    for heading in ("case", "verdict", "error / limit", "time"):
+        table.add_column(heading, justify="right" if heading in ("error / limit", "time") else "left")
+    for result in results:
+        short = bool(result.outcome.short)
+        table.add_row(
+            result.case.name,
+            Text(verdict(result.outcome).replace("*", ""), style="red" if short else "green"),
+            _worst(result.outcome),
+            f"{result.seconds:.1f} s",
+        )
+    return table
+
+
+def check_table(outcome: Outcome) -> RichTable:
+    """One line per check."""
+    table = RichTable(box=None, padding=(0, 2, 0, 0))
+    for heading in ("", "quantity", "ours", "reference", "error", "limit"):
+        table.add_column(heading)
+    for check in outcome.checks:
+        first, *rest = _cells(check)
+        style: Any = {True: "green", False: "bold red", None: "dim"}[check.passed]
+        table.add_row(Text(first.replace("*", ""), style=style), *(Text(cell) for cell in rest))
+    return table
