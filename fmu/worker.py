@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import json
 import math
 import os
-import queue
+import select
 import signal
 import sys
 import threading
@@ -18,8 +17,8 @@ from typing import IO, Any
 
 from fmu.units.worker_process import PROTOCOL
 
-PARENT_CHECK_INTERVAL = 1.0
-"""Time between looks at whether the host is still there [s], for hosts whose end does not close the pipe."""
+HOST_CHECK_INTERVAL = 0.5
+"""Time between looks at whether the host is still there [s], for a host that ends during a long step."""
 
 WARM_UP_TIME = 1e-9
 """Simulated time [s] of the step that compiles the kernels; it is undone."""
@@ -149,13 +148,12 @@ def main() -> None:
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the host's to handle; the input ends with it
-    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    threading.Thread(target=_read_requests, args=(sys.stdin.buffer, requests), daemon=True).start()
-    threading.Thread(target=_watch_parent, daemon=True).start()
+    if hasattr(select, "poll"):
+        threading.Thread(target=_watch_host, daemon=True).start()
     _send(answers, {"protocol": PROTOCOL})
     worker = Worker()
-    while True:
-        request = json.loads(requests.get())
+    for line in sys.stdin.buffer:
+        request = json.loads(line)
         _send(answers, answer(getattr(worker, request.pop("request")), request))
 
 
@@ -177,20 +175,13 @@ def _send(answers: IO[str], message: dict[str, Any]) -> None:
     answers.flush()
 
 
-def _read_requests(pipe: IO[bytes], requests: queue.SimpleQueue[bytes]) -> None:
-    with contextlib.suppress(OSError, ValueError):
-        for line in pipe:
-            requests.put(line)
-    # The host has closed the pipe or has gone. A step may be under way in the main thread: end it too.
+def _watch_host() -> None:
+    """End the process, a step under way included, when the host has closed the pipe or has gone."""
+    host, hangup = os.getppid(), select.poll()
+    hangup.register(0, 0)  # reports the other end's closing alone
+    while not hangup.poll(0) and os.getppid() == host:
+        time.sleep(HOST_CHECK_INTERVAL)
     os._exit(0)
-
-
-def _watch_parent() -> None:
-    parent = os.getppid()
-    while True:
-        time.sleep(PARENT_CHECK_INTERVAL)
-        if sys.platform != "win32" and os.getppid() != parent:
-            os._exit(0)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import queue
+import select
 import subprocess
 import tempfile
 import threading
+import time
 from pathlib import Path
 from typing import IO, Any
 
@@ -32,8 +35,8 @@ START_TIME_LIMIT = 60.0
 
 # What a host sets for its own Python, or preloads into it, must not reach the worker's.
 _HOST_ONLY = ("LD_PRELOAD", "PYTHONHOME", "PYTHONPATH", "PYTHONEXECUTABLE", "PYTHONSTARTUP", "__PYVENV_LAUNCHER__")
+_CHUNK = 1 << 20
 _LAUNCH = "import sys; sys.path[:0] = sys.argv[1:]; from fmu.worker import main; main()"
-_END = None
 
 
 class WorkerProcess:
@@ -48,7 +51,6 @@ class WorkerProcess:
         interpreter, import_path = find_interpreter(resources)
         environment = {name: value for name, value in os.environ.items() if name.upper() not in _HOST_ONLY}
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
-        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         try:
             self._process: subprocess.Popen[bytes] | None = subprocess.Popen(
                 # -P: the host's working folder is no place to import from.
@@ -56,7 +58,7 @@ class WorkerProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
-                # Without buffers: a buffer's lock, held by a thread that the host's exit has frozen, aborts the host.
+                # Without buffers: they hide what has come from a poll, and their locks can abort a host at its exit.
                 bufsize=0,
                 env=environment,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -68,8 +70,8 @@ class WorkerProcess:
                 f"The simulator's Python {interpreter} does not start ({error.strerror}): "
                 f"set {INTERPRETER_VARIABLE} to the Python of the environment that has warp-mpm-impact."
             ) from None
-        # The thread holds the pipe and the queue, not this object: releasing it must end the worker.
-        threading.Thread(target=_read_lines, args=(self._process.stdout, self._answers), daemon=True).start()
+        assert self._process.stdout is not None
+        self._lines = _Lines(self._process.stdout)
         hello = self._answer("start", START_TIME_LIMIT)
         if hello.get("protocol") != PROTOCOL:
             self.close()
@@ -120,14 +122,14 @@ class WorkerProcess:
 
     def _answer(self, request: str, time_limit: float) -> dict[str, Any]:
         try:
-            line = self._answers.get(timeout=time_limit)
-        except queue.Empty:
+            line = self._lines.next(time_limit)
+        except TimeoutError:
             self._kill()
             raise UnitError(
                 f"The simulator did not answer the request {request!r} within {time_limit:g} s and was ended; "
                 "reply_time_limit sets how long to wait."
             ) from None
-        if line is _END:
+        if line is None:
             raise UnitError(self._obituary(request))
         try:
             answer = json.loads(line)
@@ -179,13 +181,44 @@ def find_interpreter(resources: str) -> tuple[str, list[str]]:
     return record["interpreter"], record["import_path"]
 
 
-def _read_lines(pipe: IO[bytes], answers: queue.SimpleQueue[bytes | None]) -> None:
-    parts: list[bytes] = []
+class _Lines:
+    """Lines from a pipe, with a limit on the wait for each."""
+
+    def __init__(self, pipe: IO[bytes]) -> None:
+        self._pipe, self._parts = pipe, b""
+        # Windows cannot wait for a pipe with a limit, so there a thread waits without one.
+        self._chunks: queue.SimpleQueue[bytes] | None = None
+        if hasattr(select, "poll"):
+            self._poll = select.poll()
+            self._poll.register(pipe, select.POLLIN)
+        else:
+            self._chunks = queue.SimpleQueue()
+            threading.Thread(target=_read_chunks, args=(pipe, self._chunks), daemon=True).start()
+
+    def next(self, time_limit: float) -> bytes | None:
+        """The next line, None at the end; raises TimeoutError if none comes within the limit [s]."""
+        end = time.monotonic() + time_limit
+        while b"\n" not in self._parts:
+            chunk = self._chunk(max(end - time.monotonic(), 0.0))
+            if not chunk:
+                return None
+            self._parts += chunk
+        line, _, self._parts = self._parts.partition(b"\n")
+        return line
+
+    def _chunk(self, time_limit: float) -> bytes:
+        if self._chunks is not None:
+            try:
+                return self._chunks.get(timeout=time_limit)
+            except queue.Empty:
+                raise TimeoutError from None
+        if not self._poll.poll(math.ceil(1000 * time_limit)):
+            raise TimeoutError
+        return os.read(self._pipe.fileno(), _CHUNK)
+
+
+def _read_chunks(pipe: IO[bytes], chunks: queue.SimpleQueue[bytes]) -> None:
     with contextlib.suppress(OSError, ValueError):  # the pipe may be closed under way
-        while chunk := pipe.read(1 << 16):
-            *lines, rest = chunk.split(b"\n")
-            for line in lines:
-                answers.put(b"".join([*parts, line]))
-                parts = []
-            parts.append(rest)
-    answers.put(_END)
+        while chunk := pipe.read(_CHUNK):
+            chunks.put(chunk)
+    chunks.put(b"")
