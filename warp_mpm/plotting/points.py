@@ -51,21 +51,25 @@ def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] = PR
     frames = [[results.snapshots.at(time) for time in wanted] for results in runs]
     values = [[shown(results, frame, field) for frame in row] for results, row in zip(runs, frames, strict=True)]
     low, high = colour_limits(np.concatenate([one for row in values for one in row]), field.signed)
-    windows = [window(results.scenario, row) for results, row in zip(runs, frames, strict=True)]
+    # One window for all, so that lengths compare from panel to panel.
+    windows = np.array([window(results.scenario, row) for results, row in zip(runs, frames, strict=True)])
+    left, bottom = windows[:, [0, 2]].min(axis=0)
+    right, top = windows[:, [1, 3]].max(axis=0)
+    view = (float(left), float(right), float(bottom), float(top))
 
     # Panels as wide as a page, but no taller than a third of one; the rest of the width is labels and scale.
-    aspects = [(right - left) / (top - bottom) for left, right, bottom, top in windows]
+    aspect = (right - left) / (top - bottom)
     page = 7.0 if len(runs) == 1 else 5.0
-    panel_height = max(min(max(page / aspect, 0.6), 3.2) for aspect in aspects)
-    width = sum(min(max(panel_height * aspect, 4.0), page) for aspect in aspects) + 2.0
+    panel_height = min(max(page / aspect, 0.6), 3.2)
+    width = min(max(panel_height * aspect, 4.0), page) * len(runs) + 2.0
     figure = Figure(figsize=(width, (panel_height + 0.35) * len(wanted) + 0.8), layout="compressed")
-    axes = figure.subplots(len(wanted), len(runs), squeeze=False)
+    axes = figure.subplots(len(wanted), len(runs), squeeze=False, sharex=True, sharey=True)
     drawn: Any = None
     for column, results in enumerate(runs):
         for row, frame in enumerate(frames[column]):
             panel = axes[row, column]
             drawn = draw_points(panel, frame, values[column][row], field, (low, high))
-            draw_surroundings(panel, results.scenario, frame, windows[column])
+            draw_surroundings(panel, results.scenario, frame, view)
             greatest = float(values[column][row].max(initial=0.0))
             heading = f"t = {frame.time:.2f} s   greatest {field.label.split(',')[0]} {greatest:.3g} {field.unit}"
             if row == 0 and len(runs) > 1:
