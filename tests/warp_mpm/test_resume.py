@@ -108,6 +108,33 @@ def test_stopped_in_time_and_again(tmp_path, whole):
     assert [event["simulated_time"] for event in resumed] == pytest.approx([0.74, 1.13])
 
 
+def test_records_that_only_the_stop_called_for_are_dropped(tmp_path, coarse_case_1, flying_points):
+    """Stopped at a snapshot between two samples: the time series got a sample that is not in its schedule."""
+    scenario = coarse_case_1.replaced({"output.snapshot_interval_s": 0.0371})
+    run_scenario(scenario, tmp_path / "whole", make_simulation=flying_points)
+    seen = []
+    run_scenario(
+        scenario,
+        tmp_path / "run",
+        make_simulation=flying_points,
+        on_progress=lambda progress: seen.append(progress.time),
+        stop=lambda: bool(seen) and seen[-1] == pytest.approx(0.515),  # the next stretch ends at 0.5194 s
+    )
+    assert Results.open(tmp_path / "run").time_series["time"][-1] == pytest.approx(0.5194)
+    resume_run(tmp_path / "run", make_simulation=flying_points)
+    assert_same_run(tmp_path / "run", tmp_path / "whole")
+
+
+def test_what_was_written_after_the_checkpoint_is_cut_off(stopped, flying_points):
+    path = stopped / run_folder.TIME_SERIES
+    content = path.read_text()
+    path.write_text(content + 100 * content.splitlines(keepends=True)[-1] + "1.0,2.0,")
+    resume_run(stopped, make_simulation=flying_points, stop=lambda: True)
+    time = Results.open(stopped).time_series["time"]
+    assert np.diff(time) == pytest.approx(0.005)
+    assert path.read_text().endswith("\n")
+
+
 def test_checkpoints_do_not_change_the_run(tmp_path, whole):
     reference, scenario, _ = whole
     changed = scenario.replaced({"output.checkpoint_interval_s": 0.0137})

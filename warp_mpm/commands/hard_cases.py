@@ -15,6 +15,7 @@ def hard_cases(
     quick: Annotated[
         bool, typer.Option("--quick", help="Leave out the large scenes and the runs at half the time step.")
     ] = False,
+    small: Annotated[bool, typer.Option("--small", help="Leave out the large scenes, which take minutes.")] = False,
     only: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Only this case; may be given again.", show_default=False)
     ] = None,
@@ -42,7 +43,7 @@ def hard_cases(
 
     pictures = out if page is None else page.with_suffix("")
     try:
-        cases = collection.hard_cases(only, quick=quick)
+        cases = collection.hard_cases(only, small=small or quick)
         for folder in (out, pictures):
             folder.mkdir(parents=True, exist_ok=True)
     except (ValueError, ScenarioError) as error:

@@ -10,7 +10,7 @@ from warp_mpm.scenario import Scenario
 FOLDER = Path(__file__).parents[2] / "scenarios" / "hard"
 
 LARGE = frozenset({"million_points"})
-"""Cases that take minutes on a processor; `--quick` leaves them out."""
+"""Cases that take minutes on a processor; `--small` and `--quick` leave them out."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class HardCase:
         return self.scenario.notes[0]
 
 
-def hard_cases(names: list[str] | None = None, *, folder: Path = FOLDER, quick: bool = False) -> list[HardCase]:
+def hard_cases(names: list[str] | None = None, *, folder: Path = FOLDER, small: bool = False) -> list[HardCase]:
     """The cases named, or all of them.
 
     Raises:
@@ -39,5 +39,5 @@ def hard_cases(names: list[str] | None = None, *, folder: Path = FOLDER, quick: 
     unknown = [name for name in names or [] if name not in known]
     if unknown:
         raise ValueError(f"There is no hard case {unknown[0]!r}; it must be one of {', '.join(known)}.")
-    chosen = names or [name for name in known if not (quick and name in LARGE)]
+    chosen = names or [name for name in known if not (small and name in LARGE)]
     return [HardCase(name, Scenario.load(known[name])) for name in chosen]
