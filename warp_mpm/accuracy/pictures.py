@@ -93,7 +93,7 @@ def error_of_each_knob(study: Study) -> Figure:
     columns = 3
     rows = math.ceil((len(turned) + 1) / columns)
     figure = Figure(figsize=(12.5, 3.3 * rows), layout="constrained")
-    figure.suptitle(f"{study.scenario.title}: each setting alone", fontsize=12)
+    figure.suptitle(f"{study.scenario.title}: each setting alone (dashed: how far the reference is known)", fontsize=12)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel in panels[len(turned) + 1 :]:
         panel.set_axis_off()

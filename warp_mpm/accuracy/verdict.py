@@ -80,7 +80,10 @@ class Knob:
         if abs(worse) <= NEGLIGIBLE:
             return "buys nothing" if time == "dearer" else f"no difference, {time}"
         if abs(worse) <= self.doubt:
-            return f"{time}, with a difference within the doubt of {self.doubt:.1%}"
+            what = (
+                "buys nothing that could be told" if time == "dearer" else f"no difference that could be told, {time}"
+            )
+            return f"{what} (doubt {self.doubt:.1%})"
         if worse > 0.0:
             return f"less accurate, {time}"
         return f"more accurate, {time}"
@@ -129,10 +132,7 @@ class Study:
 
         CPU times scatter by a few per cent, so a setting must be 10 % cheaper to count.
         """
-        own = self.scenario.numerics.spacing_m
-        default = next(
-            (r for r in self.rows if r.setting.knob == DEFAULT and r.setting.spacing == own and r.errors), None
-        )
+        default = next((row for row in self.rows if _is_own(row, self.scenario) and row.errors), None)
         if default is None:
             return None
         margin = max(self.doubt("overall"), 0.002)
@@ -195,15 +195,20 @@ def evaluate(scenario: Scenario, settings: Sequence[Setting], results: Mapping[s
         )
         for row in alone
     ]
-    fronts = {name: front(numeric, name) for name in [*found.names, "overall"]}
+    fronts = {name: front(numeric, name, found.uncertainty(name)) for name in found.names}
+    fronts["overall"] = front(numeric, "overall", doubt)
     return Study(scenario, found, numeric, effects, knobs, fronts)
 
 
-def front(rows: Sequence[Row], name: str) -> list[Row]:
-    """The Pareto front of error against time: no other row is both cheaper and more accurate."""
+def front(rows: Sequence[Row], name: str, doubt: float = 0.0) -> list[Row]:
+    """The Pareto front of error against time: no other row is both cheaper and more accurate.
+
+    Errors below the relative `doubt` of the reference are all alike, so the front ends with the first of them.
+    """
     kept: list[Row] = []
     for row in sorted(rows, key=lambda row: row.time):
-        if math.isfinite(error_of(row, name)) and (not kept or error_of(row, name) < error_of(kept[-1], name)):
+        error = max(error_of(row, name), doubt)
+        if math.isfinite(error) and (not kept or error < max(error_of(kept[-1], name), doubt)):
             kept.append(row)
     return kept
 
@@ -226,16 +231,10 @@ def sentences(study: Study) -> list[str]:
         said.append(f"{label}: {answer}; the reference is known to {study.doubt(name):.1%}.")
     for knob in study.knobs:
         said.append(
-            f"{knob.name} {level_text(knob.level)}: {knob.verdict} ({knob.time_ratio:.2g} times the time, error "
-            f"{_percent(knob.overall)} where the default has {_percent(knob.default_overall)})."
+            f"{knob.name} {level_text(knob.level)}: {knob.verdict}: {knob.time_ratio:.2g} times the time, error "
+            f"{_percent(knob.overall)} where the default has {_percent(knob.default_overall)}."
         )
-    beaten = study.default_beaten_by
-    own = study.scenario.numerics.spacing_m
-    said.append(
-        f"The scenario's own settings (spacing {own:g} m) are on the front."
-        if beaten is None
-        else f"The scenario's own settings (spacing {own:g} m) are beaten by {beaten.setting.name}."
-    )
+    said.append(_place_of_default(study))
     spacing = study.recommended_spacing
     said.append(
         f"No spacing of this study keeps {DEFAULT_TARGET:.0%} on the key figures."
@@ -244,6 +243,25 @@ def sentences(study: Study) -> list[str]:
         "all finer ones do."
     )
     return said
+
+
+def _place_of_default(study: Study) -> str:
+    """Whether the scenario's own settings are on the front, and of what."""
+    subject = f"The scenario's own settings (spacing {study.scenario.numerics.spacing_m:g} m)"
+    beaten = study.default_beaten_by
+    if beaten is not None:
+        return f"{subject} are beaten by {beaten.setting.name}, in the key figures and beyond doubt."
+    own = [
+        QUANTITIES[name].label if name in QUANTITIES else "the key figures together"
+        for name, rows in study.fronts.items()
+        if any(_is_own(row, study.scenario) for row in rows)
+    ]
+    places = f"; they are on the front of {', '.join(own)}" if own else ""
+    return f"{subject} are beaten by none beyond the doubt of {study.doubt('overall'):.1%}{places}."
+
+
+def _is_own(row: Row, scenario: Scenario) -> bool:
+    return row.setting.knob == DEFAULT and row.setting.spacing == scenario.numerics.spacing_m
 
 
 def _turned_alone(rows: Sequence[Row]) -> list[Row]:

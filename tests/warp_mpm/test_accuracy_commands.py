@@ -1,0 +1,110 @@
+"""`python -m warp_mpm accuracy` and `run --accuracy | --budget`, from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from warp_mpm.accuracy import purchase
+from warp_mpm.accuracy.study import scene_key
+from warp_mpm.cli import app
+from warp_mpm.scenario import Scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+@pytest.fixture
+def coarse(tmp_path: Path) -> Path:
+    """Case 1 until shortly after the front's arrival, on a grid on which that takes a moment."""
+    content = json.loads((SCENARIOS / "case_1.json").read_text())
+    content["numerics"]["spacing_m"] = 0.8
+    content["output"]["end_time_s"] = 0.8
+    path = tmp_path / "coarse.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--accuracy", "5"], "--accuracy 5 must be a percentage from 0.1% to 50%"),
+        (["--budget", "0s"], "--budget 0s must be a time from 1s"),
+        (["--budget", "60s", "--spacing", "0.3"], "only one is allowed"),
+        (["--budget", "60s", "--accuracy", "5%"], "only one is allowed"),
+    ],
+)
+def test_refuses_in_one_sentence(coarse: Path, tmp_path: Path, options: list[str], said: str) -> None:
+    result = CliRunner().invoke(app, ["run", str(coarse), "--out", str(tmp_path / "run"), *options])
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "run").exists()
+
+
+def test_buys_runs_and_settles(coarse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarser probes than those of a user, to be quick."""
+    monkeypatch.setattr(purchase, "PROBE_CELLS", (3.0, 4.0, 5.0))
+    folder = tmp_path / "run"
+    result = CliRunner().invoke(app, ["run", str(coarse), "--accuracy", "50%", "--out", str(folder)])
+    assert result.exit_code == 0, result.stderr
+    assert "Chosen: spacing" in result.stderr
+    assert "times what was expected" in result.stderr
+    chosen = json.loads((folder / "scenario.json").read_text())["numerics"]["spacing_m"]
+    assert f"Chosen: spacing {chosen:g} m" in result.stderr
+
+
+def test_ladders_of_several_scenes_and_their_data(coarse: Path, tmp_path: Path) -> None:
+    fixed = tmp_path / "fixed.json"
+    content = json.loads(coarse.read_text())
+    content["barrier"]["motion"] = {"kind": "fixed"}
+    fixed.write_text(json.dumps(content))
+    out, data = tmp_path / "out", tmp_path / "data.json"
+    command = ["accuracy", str(coarse), str(fixed), "--quick", "--jobs", "1", "--out", str(out), "--data", str(data)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.stderr
+    assert "8 done, 0 running, 0 left" in result.stderr
+    assert (out / "closed_form.png").stat().st_size > 10_000
+    assert "closed form, paper's λ" in (out / "closed_form.md").read_text()
+    scenes = json.loads(data.read_text())["scenes"]
+    sliding = scenes[scene_key(Scenario.load(coarse))]
+    assert [rung["spacing"] for rung in sliding["rungs"]] == [2.0, 1.6, 1.2, 0.8]
+    assert sliding["rungs"][0]["figures"]["barrier_displacement_final"] > 0.0
+    assert "barrier_displacement_final" not in scenes[scene_key(Scenario.load(fixed))]["rungs"][0]["figures"]
+    # The same again: nothing is run.
+    again = CliRunner().invoke(app, command)
+    assert "running (" not in again.stderr
+    assert "8 done, 0 running, 0 left" in again.stderr
+
+
+def test_accuracy_refuses_a_folder_that_is_none(coarse: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["accuracy", str(coarse), "--data", str(tmp_path / "no" / "data.json")])
+    assert result.exit_code == 2
+    assert "must be a file in a folder that exists" in result.stderr
+
+
+@pytest.mark.slow
+def test_whole_study(coarse: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["accuracy", str(coarse), "--quick", "--jobs", "2", "--out", str(out)])
+    assert result.exit_code == 0, result.stderr
+    assert "are beaten by" in result.stdout
+    text = (out / "study.md").read_text()
+    for heading in ("What it says", "References", "leaving an effect out", "price of the closed form"):
+        assert heading in text
+    for picture in ("error_against_time", "each_setting", "where_time_goes"):
+        assert (out / f"{picture}.png").stat().st_size > 10_000
+
+
+def test_shipped_data_is_of_the_scenes_that_are_shipped() -> None:
+    """A scenario that changes makes its data useless without a word; then it is to be measured anew."""
+    known = {scene_key(Scenario.load(path)) for path in SCENARIOS.glob("*.json")}
+    shipped = purchase.shipped_ladders()
+    assert shipped
+    assert set(shipped) <= known
+    for rungs in shipped.values():
+        assert len(rungs) >= 3
+        times = [rung.time for rung in sorted(rungs, key=lambda rung: -rung.spacing)]
+        assert times == sorted(times)
