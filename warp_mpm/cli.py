@@ -179,6 +179,8 @@ def run(
         typer.echo(json.dumps(outcome.summary, indent=2, ensure_ascii=False))
     else:
         display.summarize(outcome)
+        if report and not quiet:
+            typer.echo(f"The report is {folder / 'report.html'}")
     if offer is not None and outcome.finished and not quiet:
         typer.echo(offer.settled(folder, time.process_time() - bought_at), err=True)
     if not outcome.finished:

@@ -49,4 +49,4 @@ def animate(
             watch=lambda frames: track(frames, "pictures", console=console, disable=not console.is_terminal),
         )
         if not quiet:
-            typer.echo(f"{target} ({target.stat().st_size / 1e6:.1f} MB)")
+            typer.echo(f"{target} ({target.stat().st_size / 1e6:.2g} MB)")

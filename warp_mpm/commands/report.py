@@ -39,4 +39,4 @@ def report(
         from warp_mpm.report import write_report
 
         write_report(results, target, times=wanted)
-        typer.echo(f"{target} ({target.stat().st_size / 1e6:.1f} MB)")
+        typer.echo(f"{target} ({target.stat().st_size / 1e6:.2g} MB)")
