@@ -8,6 +8,7 @@ import typer
 
 from warp_mpm.commands.accuracy import accuracy
 from warp_mpm.commands.animate import animate
+from warp_mpm.commands.benchmark import benchmark
 from warp_mpm.commands.hard_cases import hard_cases
 from warp_mpm.commands.plan import plan
 from warp_mpm.commands.plot import plot
@@ -28,6 +29,7 @@ EXAMPLES: dict[Callable[..., None], str] = {
     accuracy: "Example: python -m warp_mpm accuracy scenarios/case_1.json --quick",
     hard_cases: "Example: python -m warp_mpm hard-cases --quick --only speed_50 --only falling_jet",
     plan: "Example: python -m warp_mpm plan scenarios/case_1.json --what-if",
+    benchmark: "Example: python -m warp_mpm benchmark speed --out docs/performance",
 }
 
 

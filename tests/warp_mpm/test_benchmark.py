@@ -1,0 +1,75 @@
+"""The benchmark's own parts: that the yardstick is a step, that turns are fair, and that tables and chart are made."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from warp_mpm.effect_rules import effect_rules
+from warp_mpm.performance.benchmark import SHORT, Table, _ladder
+from warp_mpm.performance.chart import effects_chart
+from warp_mpm.performance.probe import in_turns
+from warp_mpm.performance.yardstick import Yardstick
+from warp_mpm.plotting import save
+from warp_mpm.simulation import Simulation
+
+
+def test_the_yardstick_conserves_momentum():
+    """It is a real step of scatter and gather: total momentum stays, velocities are smoothed."""
+    yardstick = Yardstick(1000)
+    before = np.random.default_rng(1).normal(size=(1000, 2)) * 1e-3
+    after = yardstick._held[1].numpy()
+    np.testing.assert_allclose(after.sum(axis=0), before.sum(axis=0), atol=1e-13)
+    assert after.std() < 0.7 * before.std()
+    assert yardstick.chunk(0.01) > 0.0
+
+
+class Known:
+    """Costs so much, times how slow the machine happens to be."""
+
+    def __init__(self, cost, slowness):
+        self.cost, self.slowness = cost, slowness
+
+    def chunk(self, seconds):
+        self.slowness[1] += 1
+        return self.cost * self.slowness[0][self.slowness[1] // 3 % len(self.slowness[0])]
+
+
+def test_ratios_hold_on_a_machine_with_other_work():
+    """A third of the rounds runs at half the speed, all of a round alike."""
+    slowness = [[1.0, 1.0, 2.0], -1]
+    costs = in_turns([Known(cost, slowness) for cost in (10.0, 53.0, 44.0)], rounds=9, seconds=0.0)
+    assert costs == pytest.approx([10.0, 53.0, 44.0])
+
+
+def test_the_ladder_adds_one_effect_at_a_time(load_scene):
+    scenes = _ladder(load_scene("case_1").replaced(SHORT))
+    rules = [{rule.effect: rule.value for rule in effect_rules(scene)} for _, scene in scenes]
+    changed = [{name for name in after if after[name] != before[name]} for before, after in pairwise(rules)]
+    # The second phase brings the drag along; all others are one effect.
+    assert [len(names) for names in changed] == [1] * 8 + [2] + [1] * 4
+    assert changed[8] == {"formulation", "drag"}
+    assert len(scenes) == 14
+
+
+def test_cost_follows_the_points_and_not_the_domain(load_scene):
+    """Launched kernels walk the same blocks, whatever the size of the grid: 3 % is what the issue allows."""
+    worked = []
+    for scale in (1.0, 10.0):
+        changes = {
+            "numerics.spacing_m": 0.25, "domain.left_m": -32.0 * scale, "domain.right_m": 32.0 * scale,
+            "domain.top_m": 16.0, "output.end_time_s": 0.2,
+        }  # fmt: skip
+        simulation = Simulation(load_scene("case_1", **changes))
+        simulation.advance(0.1)
+        worked.append(simulation.blocks_in_use * simulation._grid_arrays["block"].size)
+    assert worked[1] <= 1.03 * worked[0]
+
+
+def test_tables_and_chart(tmp_path):
+    table = Table("Cost", ("scene", "ratio"), [("dry", "4.3"), ("two-phase", "5.3")])
+    assert table.markdown().splitlines()[2:] == [
+        "| scene | ratio |", "|---|---|", "| dry | 4.3 |", "| two-phase | 5.3 |",
+    ]  # fmt: skip
+    save(effects_chart([("dry", 4.3, 80.0), ("liquid", 5.4, 100.0), ("cheaper", 5.2, 96.0)]), tmp_path / "chart.png")
+    assert (tmp_path / "chart.png").stat().st_size > 5000

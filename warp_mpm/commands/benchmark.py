@@ -1,0 +1,86 @@
+"""`python -m warp_mpm benchmark`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from warp_mpm.commands.refusals import refusals
+
+if TYPE_CHECKING:
+    from warp_mpm.performance.benchmark import Table
+
+
+class What(StrEnum):
+    """What is measured."""
+
+    speed = "speed"
+    effects = "effects"
+
+
+def benchmark(
+    what: Annotated[What, typer.Argument(help="speed: ratios to the barest step; effects: the cost of each.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for tables and chart.", show_default=False),
+    ] = None,
+    full: Annotated[bool, typer.Option("--full", help="Up to a million points; some minutes and 2 GB.")] = False,
+    device: Annotated[str, typer.Option(help="Warp device: cpu, cuda:0, ...")] = "cpu",
+) -> None:
+    """Measure what a step costs on this machine, in ratios to a yardstick: the barest scatter and gather there can be.
+
+    Everything takes turns with the yardstick, and on the CPU time is that of the process, so that other work on the
+    machine changes the ratios little. New effects are compiled first, some seconds each.
+    """
+    from rich.console import Console
+    from rich.table import Table as Shown
+
+    with refusals():
+        from warp_mpm.performance.benchmark import CASE, effect_costs, machine, speed_tables
+        from warp_mpm.performance.benchmark import Table as Made
+        from warp_mpm.performance.chart import effects_chart
+        from warp_mpm.plotting import save
+        from warp_mpm.scenario import Scenario
+
+        console = Console(highlight=False, markup=False)
+        progress = Console(stderr=True, highlight=False, markup=False)
+        base = Scenario.load(CASE)
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+
+        def told(name: str) -> None:
+            progress.print(f"measuring: {name}", style="dim")
+
+        if what is What.speed:
+            tables = speed_tables(base, device=device, full=full, progress=told)
+        else:
+            costs = effect_costs(base, device=device, progress=told)
+            rows, before = [], 0.0
+            for name, ratio, cost in costs:
+                rows.append((name, f"{ratio:.2f}", f"{ratio - before:+.2f}", f"{cost:.1f}"))
+                before = ratio
+            columns = ("effects, one more each", "yardsticks", "added", "ns per point and step")
+            tables = [Made("Cost of each effect, added to those above it", columns, rows)]
+            if out is not None:
+                save(effects_chart(costs), out / "effects.png")
+        for table in tables:
+            shown = Shown(
+                *table.columns, title=f"\n{table.title}", title_justify="left", box=None, padding=(0, 2, 0, 0)
+            )
+            for row in table.rows:
+                shown.add_row(*row)
+            console.print(shown)
+        if out is not None:
+            _write(out, what, tables, machine())
+
+
+def _write(out: Path, what: What, tables: list[Table], taken_on: dict[str, str]) -> None:
+    content = {"machine": taken_on, "tables": [asdict(table) for table in tables]}
+    (out / f"{what}.json").write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    head = f"{taken_on['processor']}, Warp {taken_on['warp']}, Python {taken_on['python']}, {taken_on['taken']}\n\n"
+    (out / f"{what}.md").write_text(head + "\n".join(table.markdown() for table in tables))

@@ -1,0 +1,276 @@
+"""Speed of the simulator on this machine, as ratios to the barest possible step in the same run."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from warp_mpm.effect_rules import without_liquid
+from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
+from warp_mpm.performance.yardstick import Yardstick
+from warp_mpm.recording import SnapshotRecorder, TimeSeriesRecorder, record_until
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+
+SHORT: dict[str, Any] = {"numerics.spacing_m": 0.125, "output.end_time_s": 0.5}
+"""The scene of the ratios: the paper's case 1 with some 11,500 points, on a grid fitted to half a second."""
+
+ROUNDS, TURN = 11, 0.1
+"""Turns that each measurement has, and their length [s]."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a benchmark, for the terminal, for JSON and for a page."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+    def markdown(self) -> str:
+        """As a table of Markdown."""
+        lines = ["| " + " | ".join(self.columns) + " |", "|" + "---|" * len(self.columns)]
+        lines += ["| " + " | ".join(row) + " |" for row in self.rows]
+        return f"**{self.title}**\n\n" + "\n".join(lines) + "\n"
+
+
+def speed_tables(base: Scenario, *, device: str, full: bool, progress: Progress) -> list[Table]:
+    """All tables of `benchmark speed`.
+
+    Args:
+        base: a two-phase scene with everything on.
+        device: a Warp device.
+        full: also a million points, which takes some minutes and 2 GB.
+        progress: called with what is being measured.
+    """
+    scene = base.replaced(SHORT)
+    tables = [_ratios(scene, device, progress), _kernels(scene, device, progress)]
+    tables += [_sizes(base, device, full, progress), _domains(scene, device, progress), _drag(base, device, progress)]
+    tables += [_recording(base, device, progress)]
+    if device == "cpu":
+        tables.append(_first_run(progress))
+    return tables
+
+
+def effect_costs(base: Scenario, *, device: str, progress: Progress) -> list[tuple[str, float, float]]:
+    """Name, ratio to the yardstick and cost [ns] per point and step, with effects added one at a time."""
+    clock = clock_of(device)
+    named = _ladder(base.replaced(SHORT))
+    steppers = []
+    for name, scene in named:
+        progress(name)
+        steppers.append(Stepper(scene, device=device, clock=clock))
+    yardstick = Yardstick(steppers[0].simulation.material_points, device=device, clock=clock)
+    measured: list[Measured] = [yardstick, *steppers]
+    costs = in_turns(measured, rounds=ROUNDS, seconds=0.5 * TURN)
+    return [(name, cost / costs[0], cost) for (name, _), cost in zip(named, costs[1:], strict=True)]
+
+
+def _ladder(full: Scenario) -> list[tuple[str, Scenario]]:
+    """Scenes from a dry elastic flow on smooth ground up to everything, one effect more each."""
+    undrained = full.replaced(without_liquid(full))
+    dry = undrained.replaced(without_liquid(undrained))
+    assert full.barrier is not None
+    barrier = full.resolved()["barrier"]
+    fixed = barrier | {"motion": {"kind": "fixed"}, "friction": 0.0}
+    nothing: dict[str, Any] = {
+        "barrier": None, "flow.material.plasticity": False, "numerics.volumetric_smoothing": False,
+        "numerics.bulk_viscosity": 0.0,
+    }  # fmt: skip
+    steps: list[tuple[str, dict[str, Any]]] = [
+        ("dry, elastic, smooth ground", {}),
+        ("plasticity", {"flow.material.plasticity": True}),
+        ("volumetric smoothing", {"numerics.volumetric_smoothing": True}),
+        ("bulk viscosity", {"numerics.bulk_viscosity": full.numerics.bulk_viscosity or 0.2}),
+        ("fixed barrier", {"barrier": fixed}),
+        ("barrier friction", {"barrier": fixed | {"friction": barrier["friction"]}}),
+        ("sliding barrier", {"barrier": barrier}),
+    ]
+    scenes, scene = [], dry.replaced(nothing)
+    for name, changes in steps:
+        scene = scene.replaced(changes)
+        scenes.append((name, scene))
+    wet = {"numerics.pressure_relaxation": 0.0}
+    scenes.append(("liquid, undrained", undrained.replaced(wet)))
+    scenes.append(("pressure relaxation", undrained))
+    scenes.append(("second phase, drag", full))
+    scene = full
+    steps = [
+        ("porosity update", {"flow.material.porosity_update": True}),
+        ("ground friction", {"ground.friction": 0.3}),
+        ("side walls", {"domain.left_edge": "wall", "domain.right_edge": "wall"}),
+        ("ceiling", {"domain.top_edge": "wall"}),
+    ]
+    for name, changes in steps:
+        scene = scene.replaced(changes)
+        scenes.append((name, scene))
+    return scenes
+
+
+def _ratios(scene: Scenario, device: str, progress: Progress) -> Table:
+    progress("ratio to the yardstick")
+    clock = clock_of(device)
+    undrained = scene.replaced(without_liquid(scene))
+    dry = undrained.replaced(without_liquid(undrained))
+    scenes = {
+        "two-phase, all on": scene,
+        "undrained": undrained,
+        "dry": dry,
+        "two-phase, fixed barrier": scene.replaced({"barrier.motion": {"kind": "fixed"}}),
+        "two-phase, FLIP": scene.replaced({"numerics.transfer": "flip"}),
+        "two-phase, float32": scene.replaced({"numerics.precision": "float32"}),
+    }
+    steppers = [Stepper(each, device=device, clock=clock) for each in scenes.values()]
+    points = steppers[0].simulation.material_points
+    costs = in_turns([Yardstick(points, device=device, clock=clock), *steppers], rounds=ROUNDS, seconds=TURN)
+    rows = [("yardstick", f"{costs[0]:.1f}", "1.0", "")]
+    for name, cost, stepper in zip(scenes, costs[1:], steppers, strict=True):
+        held = sum(size for array, size in stepper.simulation.arrays.items() if array.startswith("points."))
+        rows.append((name, f"{cost:.1f}", f"{cost / costs[0]:.2f}", f"{held / points:.0f}"))
+    title = f"Cost of a step, {points:,} points"
+    return Table(title, ("scene", "ns per point and step", "yardsticks", "bytes per point"), rows)
+
+
+def _kernels(scene: Scenario, device: str, progress: Progress) -> Table:
+    progress("kernels of a step")
+    simulation = Simulation(scene, device=device)
+    simulation.advance(1e-3)
+    spent = simulation.kernel_times(0.2)
+    idle = min(spent.values())
+    whole = sum(each - idle for each in spent.values())
+    rows = [(name, f"{(spent[name] - idle) / whole:.1%}") for name in simulation.launched_kernels]
+    return Table("Where the time of a two-phase step goes", ("kernel", "share"), rows)
+
+
+def _sizes(base: Scenario, device: str, full: bool, progress: Progress) -> Table:
+    progress("number of points")
+    clock = clock_of(device)
+    spacings = [0.25, 0.125, 0.0625, *([0.03125, 0.0133] if full else [])]
+    rows, first = [], 0.0
+    for spacing in spacings:
+        scene = base.replaced({"numerics.spacing_m": spacing, "output.end_time_s": 0.2})
+        stepper = Stepper(scene, device=device, clock=clock)
+        points = stepper.simulation.material_points
+        small = Yardstick(11_472, device=device, clock=clock)
+        yard, cost = in_turns([small, stepper], rounds=7, seconds=TURN)
+        first = first or cost / yard
+        rows.append((f"{points:,}", f"{cost:.1f}", f"{cost / yard:.2f}", f"{cost / yard / first - 1.0:+.0%}"))
+    columns = ("points", "ns per point and step", "yardsticks", "against the first")
+    return Table("Cost against the number of points (yardstick of 11,472)", columns, rows)
+
+
+def _domains(scene: Scenario, device: str, progress: Progress) -> Table:
+    progress("size of the domain")
+    clock = clock_of(device)
+    steppers = []
+    for scale in (1.0, 10.0):
+        edges = {"domain.left_m": -30.0 * scale, "domain.right_m": 30.0 * scale, "domain.top_m": 15.0}
+        steppers.append(Stepper(scene.replaced(edges), device=device, clock=clock))
+    costs = in_turns(steppers, rounds=ROUNDS, seconds=TURN)
+    rows = [
+        (name, f"{cost:.1f}", f"{cost / costs[0] - 1.0:+.1%}")
+        for name, cost in zip(("60 m", "600 m"), costs, strict=True)
+    ]
+    return Table("Cost against the length of the domain", ("domain", "ns per point and step", "difference"), rows)
+
+
+def _drag(base: Scenario, device: str, progress: Progress) -> Table:
+    progress("drag, explicit and semi-implicit")
+    rows, displacements = [], []
+    for drag in ("semi_implicit", "explicit"):
+        changes = {"numerics.spacing_m": 0.4, "numerics.drag": drag, "output.end_time_s": 1.2}
+        simulation = Simulation(base.replaced(changes), device=device)
+        simulation.advance(1.2)
+        displacements.append(simulation.barrier_displacement)
+        share = displacements[-1] / displacements[0] - 1.0
+        record = simulation.record
+        row = (drag.replace("_", "-"), f"{record['steps']:,}", f"{record['time_step_max']:.2e}")
+        rows.append((*row, f"{displacements[-1]:.4f} ({share:+.1%})"))
+    columns = ("drag", "steps to t = 1.2 s", "greatest step [s]", "barrier displacement [m]")
+    return Table("What semi-implicit drag saves, at 0.4 m", columns, rows)
+
+
+def _recording(base: Scenario, device: str, progress: Progress) -> Table:
+    progress("recording")
+    clock, scene = clock_of(device), base.replaced({"output.end_time_s": 2.0})
+    output, spent = scene.output, []
+    for recorded in (False, True):
+        simulation = Simulation(scene, device=device)
+        simulation.advance(1e-6)
+        with tempfile.TemporaryDirectory() as folder:
+            begin = clock()
+            if recorded:
+                series = TimeSeriesRecorder(Path(folder) / "series.csv", output.time_series_interval_s)
+                snapshots = SnapshotRecorder(
+                    Path(folder) / "snapshots.vtkhdf", output.snapshot_interval_s, output.end_time_s
+                )
+                record_until(simulation, [series, snapshots], output.end_time_s)
+                series.close()
+                snapshots.close()
+            else:
+                simulation.advance(output.end_time_s)
+            spent.append((clock() - begin, simulation.steps))
+    (plain, plain_steps), (whole, steps) = spent
+    # Landing on the records takes more steps, which are no fault of the recorders.
+    share = (whole - plain * steps / plain_steps) / whole
+    rows = [
+        ("in one go", f"{plain_steps:,}", f"{plain:.2f}", ""),
+        ("with time series and snapshots", f"{steps:,}", f"{whole:.2f}", f"{share:.1%}"),
+    ]
+    columns = ("case 1 at 0.2 m to t = 2 s", "steps", "time [s]", "share of recording and Python")
+    return Table("Recording", columns, rows)
+
+
+def _first_run(progress: Progress) -> Table:
+    """Time to the end of the first step in a new process, with and without kernels compiled before."""
+    progress("first run, kernels compiled from nothing")
+    code = (
+        "import sys, time; begin = time.perf_counter()\n"
+        "from warp_mpm import Scenario, Simulation\n"
+        "simulation = Simulation(Scenario.load(sys.argv[1])); simulation.advance(1e-4)\n"
+        "print(time.process_time(), time.perf_counter() - begin)"
+    )
+    scene = Scenario.load(CASE).resolved()
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.json"
+        file.write_text(Scenario.model_validate(scene).model_dump_json())
+        environment = os.environ | {"WARP_CACHE_PATH": folder, "PYTHONPATH": str(CASE.parents[1])}
+        for name in ("compiled from nothing", "again"):
+            done = subprocess.run(
+                [sys.executable, "-c", code, str(file)], env=environment, capture_output=True, text=True, check=True
+            )
+            busy, wall = done.stdout.split()[-2:]
+            rows.append((name, f"{float(busy):.1f}", f"{float(wall):.1f}"))
+    columns = ("start of case 1, to its first step", "processor [s]", "on the wall [s]")
+    return Table("First run and later ones", columns, rows)
+
+
+CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"
+
+
+def machine() -> dict[str, str]:
+    """What the figures were taken on."""
+    import warp
+
+    name = platform.processor() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    return {"processor": name, "warp": warp.__version__, "python": platform.python_version(), "taken": _today()}
+
+
+def _today() -> str:
+    return time.strftime("%Y-%m-%d", time.gmtime())
