@@ -91,8 +91,8 @@ def record_page(outcomes: list[Outcome], pictures: str) -> str:
     lines = [
         "# Robustness",
         "",
-        "Made by `python -m warp_mpm hard-cases --page docs/robustness.md`; do not edit by hand. Large scenes are left out "
-        "where that took `--small`.",
+        "Made by `python -m warp_mpm hard-cases --page docs/robustness.md`; do not edit by hand. `--small` leaves out "
+        "the scene of a million material points.",
         "",
         f"Scenes chosen to break the code: {stable} of {len(outcomes)} meet every demand. Most are coarse variants of "
         "case 1 (3 m deep, 0.5 m spacing), so that each runs in seconds: a coarse grid is the harder test.",
