@@ -30,5 +30,8 @@ test: lint
 validate: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
 
+docs: $(VENV)/.test
+	$(BIN)/mkdocs build --strict --config-file docs/site/mkdocs.yml
+
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -46,7 +46,7 @@ DEFINITIONS = {
         "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their noise "
         "about the mean over a cell"
     ),
-    "pore_pressure_max_anywhere": "greatest pore pressure of any single material point, noise and landing jets included",
+    "pore_pressure_max_anywhere": "greatest pore pressure of any single material point, noise and jets included",
     "retained_volume": "material upstream of the crest at the end, at the flow's initial density",
     "on_crest_volume": "material above the crest at the end",
     "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",

@@ -50,7 +50,11 @@ TIME_SERIES = _registry(
     ("barrier_kinetic_energy", "J/m", "kinetic energy of the barrier, E_k2"),
     ("barrier_work", "J/m", "work done by the flow on the barrier since t = 0"),
     ("base_friction_work", "J/m", "work that friction at the barrier's base has taken since t = 0"),
-    ("pore_pressure_max", "Pa", "greatest pore pressure upstream of the crest, meant over a cell, p_L,max, compression positive"),
+    (
+        "pore_pressure_max",
+        "Pa",
+        "greatest pore pressure upstream of the crest, meant over a cell, p_L,max, compression positive",
+    ),
     ("pore_pressure_max_anywhere", "Pa", "greatest pore pressure of any material point, a landing jet's included"),
     ("speed_max", "m/s", "greatest speed of any material point, either phase"),
     ("solid_mass", "kg/m", "mass of solid in the domain"),
