@@ -19,7 +19,7 @@ import analytic.cli
 import warp_mpm.cli
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("index", "api", "how_to/material")
+QUICK = ("index", "api")
 PAGES = ("index", "tutorial", "api", *(f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md"))))
 
 BLOCK = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)

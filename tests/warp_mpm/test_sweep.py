@@ -157,7 +157,7 @@ def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster
         simulation.advance = lambda until: (time.sleep(0.004), advance(until))
         return simulation
 
-    plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 12, 13, 14, 15]}}))
+    plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 13, 14]}}))
     base, out = Scenario.load(SET_IIB), tmp_path / "out"
     ended, killed = [], []
 
@@ -171,14 +171,14 @@ def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster
 
     rows = run_sweep(plan, base, out, scheduler=address, on_case=on_case, make_simulation=slow)
     assert killed == [-signal.SIGKILL]
-    assert sorted(ended) == list(range(6))
-    assert [row["status"] for row in rows] == ["finished"] * 3 + ["failed"] + ["finished"] * 2
-    assert "ArithmeticError: the run has diverged" in rows[3]["problem"] or "diverged" in rows[3]["problem"]
+    assert sorted(ended) == list(range(4))
+    assert [row["status"] for row in rows] == ["finished", "finished", "failed", "finished"]
+    assert "the run has diverged" in rows[2]["problem"]
     table = pd.read_parquet(out / TABLE)
-    assert list(table[SPEED]) == [10, 11, 12, 13, 14, 15]
+    assert list(table[SPEED]) == [10, 11, 13, 14]
     # The stand-in's force is that of a triangle whatever the scene: 1/2 F (END - START), as far as the run went.
     whole = by_value(base).impulse(1.0)
-    assert table["impulse"].drop(3).to_numpy() == pytest.approx(whole)
+    assert table["impulse"].drop(2).to_numpy() == pytest.approx(whole)
 
     # Once more: nothing is left to be done. And one case more is another sweep.
     again = []
