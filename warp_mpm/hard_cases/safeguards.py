@@ -61,8 +61,8 @@ SAFEGUARDS = (
 )
 
 KNOWN_LIMITS = (
-    "Points rest up to 0.58 cells deep in a face at 89° for moments, 0.5 at the snapshots: between two columns of nodes the contact's own reach varies "
-    "by half a cell. Penetration halves with the spacing, in metres.",
+    "Points rest up to 0.58 cells deep in a face at 89° for moments, 0.5 at the snapshots: between two columns of "
+    "nodes the contact's own reach varies by half a cell. Penetration halves with the spacing, in metres.",
     "Over a barrier lower than the flow (`low_barrier`) the displacement changes by 13 % when the time step is halved "
     "at two cells of barrier height, 8 to 12 % at four, 5 % at eight; the peak force by 8, 3 and 2 %: the transfer "
     "dissipates per step, less on finer grids.",

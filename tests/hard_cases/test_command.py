@@ -1,0 +1,45 @@
+"""`python -m warp_mpm hard-cases` as a user types it."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from warp_mpm.cli import app
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ["hard-cases", *map(str, arguments)])
+
+
+def test_cases_are_run_drawn_and_recorded(tmp_path):
+    page = tmp_path / "robustness.md"
+    result = command("--quick", "--only", "one_point", "--only", "thin_flow", "--out", tmp_path / "out", "--page", page)
+    assert result.exit_code == 0, result.output
+    assert "2 of 2 cases are stable" in result.stdout
+    figures = json.loads((tmp_path / "out" / "hard_cases.json").read_text())
+    assert figures["thin_flow"]["stable"]
+    assert 0.0 < figures["thin_flow"]["figures"]["speed_ratio"] < 1.0
+    for name in ("one_point", "thin_flow"):
+        assert (tmp_path / "robustness" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert f"![{name}](robustness/{name}.png)" in page.read_text()
+
+
+def test_an_unstable_case_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr("warp_mpm.hard_cases.criteria.Criterion.limit_for", lambda criterion, scenario: -1.0)
+    result = command("--quick", "--only", "one_point", "--out", tmp_path)
+    assert result.exit_code == 1
+    assert "NOT STABLE: diverged 0, mass_error" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--only", "none"), "There is no hard case 'none'; it must be one of at_rest_60s, "),
+        (("--only", "one_point", "--out", "/dev/null/x"), "Cannot write to /dev/null/x: Not a directory."),
+    ],
+)
+def test_bad_input(arguments, sentence):
+    result = command(*arguments)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(sentence)
