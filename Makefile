@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: run test lint validate docs clean
+.PHONY: run test test-browser lint validate docs clean
 
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -31,7 +31,11 @@ validate: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
 
 docs: $(VENV)/.test
-	$(BIN)/mkdocs build --strict --config-file docs/site/mkdocs.yml
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict -f docs/site/mkdocs.yml   # pages in build/site
+
+test-browser: $(VENV)/.test   # needs Chromium: Debian's, or CHROMIUM=path
+	$(BIN)/pip install --quiet --editable '.[browser]'
+	$(BIN)/python -m pytest tests/warp_mpm/browser_report.py
 
 clean:
 	rm -rf runs build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
