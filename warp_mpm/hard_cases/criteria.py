@@ -53,8 +53,8 @@ CRITERIA = (
         "speed_ratio",
         1.0,
         1.0,
-        "greatest speed over sqrt(u² + 2 c u): energy gives a point u = sqrt(v0² + 2 g H) + v_b at most (H the height "
-        "it can fall, v_b the speed of a driven barrier), wave theory the water hammer rho c u when it is stopped, and "
+        "greatest speed over sqrt(3 u² + 2 c u): energy gives a point u = sqrt(v0² + 2 g H) + v_b at most (H the height "
+        "it can fall, v_b the speed of a driven barrier), wave theory the pressure rho (c + u) u when it is stopped, and "
         "Bernoulli the jet that this pressure drives",
     ),
     Criterion(
@@ -113,4 +113,4 @@ def speed_bound(scenario: Scenario) -> float:
     speed = math.sqrt(scenario.flow.speed**2 + 2.0 * (abs(gy) * span + downhill))
     if scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed):
         speed += max(abs(velocity) for velocity in scenario.barrier.motion.velocities_m_per_s)
-    return math.sqrt(speed**2 + 2.0 * step_limits(scenario).sound_speed * speed)
+    return math.sqrt(3.0 * speed**2 + 2.0 * step_limits(scenario).sound_speed * speed)
