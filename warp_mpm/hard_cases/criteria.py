@@ -53,9 +53,9 @@ CRITERIA = (
         "speed_ratio",
         1.0,
         1.0,
-        "greatest speed over sqrt(3 u² + 2 c u): energy gives a point u = sqrt(v0² + 2 g H) + v_b at most (H the height "
-        "it can fall, v_b the speed of a driven barrier), wave theory the pressure rho (c + u) u when it is stopped, and "
-        "Bernoulli the jet that this pressure drives",
+        "greatest speed over sqrt(3 u² + 2 c u): energy gives a point u = sqrt(v0² + 2 g H) + v_b at most (H the "
+        "height it can fall, v_b the speed of a driven barrier), wave theory the pressure rho (c + u) u when it is "
+        "stopped, and Bernoulli the jet that this pressure drives",
     ),
     Criterion(
         "pressure_ratio",
