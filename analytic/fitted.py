@@ -68,10 +68,10 @@ class Constants:
 
 CONSTANTS = {
     "sliding": Constants(
-        jet=1.277, weight=1.093, mass_exponent=0.289, rise=0.303, rise_length_exponent=0.559, rise_angle_exponent=-0.945
+        jet=1.286, weight=1.112, mass_exponent=0.312, rise=0.225, rise_length_exponent=0.668, rise_angle_exponent=-1.157
     ),
     "fixed": Constants(
-        jet=1.223, weight=0.889, mass_exponent=0.000, rise=0.289, rise_length_exponent=0.559, rise_angle_exponent=-1.161
+        jet=1.231, weight=0.817, mass_exponent=0.000, rise=0.215, rise_length_exponent=0.633, rise_angle_exponent=-1.536
     ),
 }
 """Fitted by ``python -m analytic sweep fit docs/data/sweep.csv``."""
