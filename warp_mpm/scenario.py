@@ -507,7 +507,7 @@ class Numerics(_Model):
     courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Share of the critical time step that is used, C_NB."""
     transfer: Literal["flip", "apic"] = "apic"
-    """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, as the paper)."""
+    """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, the paper's)."""
     pic_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
     """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
     drag: Literal["semi_implicit", "explicit"] = "semi_implicit"
@@ -694,8 +694,8 @@ class Scenario(_Model):
         snapshots = points * BYTES_PER_SNAPSHOT_POINT * self.output.end_time_s / self.output.snapshot_interval_s
         if points <= LARGEST_SCENE and snapshots > LARGEST_SNAPSHOTS:
             problems.append(
-                f"output.snapshot_interval_s = {self.output.snapshot_interval_s:g} asks for about {snapshots / 1e9:.3g} "
-                f"GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
+                f"output.snapshot_interval_s = {self.output.snapshot_interval_s:g} asks for about "
+                f"{snapshots / 1e9:.3g} GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
             )
         for name in ("time_series_interval_s", "snapshot_interval_s"):
             interval = getattr(self.output, name)

@@ -43,8 +43,8 @@ DEFINITIONS = {
     "impulse": "time integral of the horizontal force on the impacted face over the whole run",
     "impact_impulse": "the same from impact_start_time to impact_end_time",
     "pore_pressure_max": (
-        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their noise "
-        "about the mean over a cell"
+        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
+        "noise about the mean over a cell"
     ),
     "pore_pressure_max_anywhere": "greatest pore pressure of any single material point, noise and jets included",
     "retained_volume": "material upstream of the crest at the end, at the flow's initial density",
