@@ -66,7 +66,8 @@ KNOWN_LIMITS = (
     "Over a barrier lower than the flow (`low_barrier`) the displacement changes by 13 % when the time step is halved "
     "at two cells of barrier height, 8 to 12 % at four, 5 % at eight; the peak force by 8, 3 and 2 %: the transfer "
     "dissipates per step, less on finer grids.",
-    "Where a jet lands, single points meet the ground at up to a fifth of their water hammer for a few milliseconds. "
+    "Where a jet lands, single points meet the ground at up to half of the bound that their water hammer sets, for a "
+    "few milliseconds. "
     "The figure `pore_pressure_max` of a run leaves them out, `pore_pressure_max_anywhere` holds them.",
     "The skeleton's stiffness is linear: a soft one of little porosity (0.05, below 1 MPa) is pressed beyond its voids "
     "by an impact, porosity by volume below zero. The run stays stable, the material law has no answer.",
