@@ -14,6 +14,7 @@ from warp_mpm.commands.plan import plan
 from warp_mpm.commands.plot import plot
 from warp_mpm.commands.report import report
 from warp_mpm.commands.sweep import sweep
+from warp_mpm.commands.validate import validate
 
 EXAMPLES: dict[Callable[..., None], str] = {
     report: (
@@ -30,6 +31,7 @@ EXAMPLES: dict[Callable[..., None], str] = {
     hard_cases: "Example: python -m warp_mpm hard-cases --quick --only speed_50 --only falling_jet",
     plan: "Example: python -m warp_mpm plan scenarios/case_1.json --what-if",
     benchmark: "Example: python -m warp_mpm benchmark speed --out docs/performance",
+    validate: "Example: python -m warp_mpm validate --quick; one case: python -m warp_mpm validate --only terzaghi",
 }
 
 

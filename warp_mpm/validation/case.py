@@ -158,6 +158,7 @@ class Panel:
     curves: Sequence[Curve]
     log_x: bool = False
     log_y: bool = False
+    x_range: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

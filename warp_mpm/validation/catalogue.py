@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from warp_mpm.validation import columns, contact, elements, granular, jets, phases, shallow_water
+from warp_mpm.validation import columns, contact, elements, granular, jets, paper, phases, refinement, shallow_water
 from warp_mpm.validation.case import Case
 
 CASES: tuple[Case, ...] = (
@@ -15,6 +15,8 @@ CASES: tuple[Case, ...] = (
     *jets.CASES,
     *shallow_water.CASES,
     *granular.CASES,
+    *refinement.CASES,
+    *paper.CASES,
 )
 
 

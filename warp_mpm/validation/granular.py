@@ -121,7 +121,7 @@ def collapse(quick: bool) -> Outcome:
             Curve([low, low], [0.0, 0.15], "band of the experiments", "k--"),
             Curve([high, high], [0.0, 0.15], "", "k--"),
         ]
-        panels.append(Panel(f"a = {ratio:g}", "x / L_0", "depth / L_0", [*curves, *band]))
+        panels.append(Panel(f"a = {ratio:g}", "x / L_0", "depth / L_0", [*curves, *band], x_range=(-1.0, 1.3 * high)))
     fine = np.linspace(0.3, 4.5, 100)
     bands = np.array([run_out_band(float(a)) for a in fine])
     panels.append(
@@ -229,7 +229,7 @@ def _force_on_plate(slope: float, base: float, spacing: float) -> tuple[Array, A
         )
     )
     series = sampled(simulation, np.linspace(0.0, 2.0, 201)[1:])
-    return series["time"], np.convolve(series["impact_force_x"], np.full(5, 0.2), "same") * width
+    return series["time"][2:-2], np.convolve(series["impact_force_x"], np.full(5, 0.2), "valid") * width
 
 
 CASES = (

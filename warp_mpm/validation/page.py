@@ -172,6 +172,8 @@ def _draw(place: Axes, panel: Panel) -> None:
         place.set_xscale("log")
     if panel.log_y:
         place.set_yscale("log")
+    if panel.x_range is not None:
+        place.set_xlim(*panel.x_range)
     grid(place)
     if any(curve.label for curve in panel.curves):
         place.legend(fontsize=8)

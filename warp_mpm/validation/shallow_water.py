@@ -136,7 +136,7 @@ def bore(quick: bool) -> Outcome:
 
 def dam_break(quick: bool) -> Outcome:
     depth, length = 1.0, 10.0
-    spacing = 0.0625 if quick else 0.04
+    spacing = 0.05 if quick else 0.04
     celerity, unit = math.sqrt(G * depth), math.sqrt(depth / G)
     moments = (2.0, 4.0, 6.0)
     simulation = Simulation(
@@ -182,7 +182,7 @@ def dam_break(quick: bool) -> Outcome:
             remark="a front of a tip as thin as a cell lags; 5 to 15 % are usual",
         )
     )
-    return Outcome(checks=checks, panels=[Panel("depth", "x / (c_0 t)", "depth [m]", curves)])
+    return Outcome(checks=checks, panels=[Panel("depth", "x / (c_0 t)", "depth [m]", curves, x_range=(-1.5, 2.5))])
 
 
 def ritter_depth(x: Any, time: float, depth: float) -> Array:
