@@ -204,4 +204,6 @@ class Case:
     run: Callable[[bool], Outcome]
     """Called with True for the quick variant: a coarser or shorter run of the same checks."""
     in_quick: bool = True
-    """Whether there is a quick variant at all."""
+    """Whether a quick validation of everything includes it."""
+    needs_scenes: bool = False
+    """Whether it reads scenario files of the source tree."""

@@ -232,7 +232,7 @@ def _crossings(times: Array, values: Array) -> Array:
 
 
 def saturated_wave(quick: bool) -> Outcome:
-    cells = 80 if quick else 160
+    cells = 120 if quick else 160
     stiffness = LIQUID_BULK_MODULUS / POROSITY
     slow_drainage = undrained_wave_speed(OEDOMETRIC_MODULUS, stiffness, DENSITY)
     share = stiffness / (OEDOMETRIC_MODULUS + stiffness)

@@ -1,0 +1,36 @@
+"""Every case of `python -m warp_mpm validate` stays within its limits; quick variants here, full ones with `slow`."""
+
+import pytest
+
+from warp_mpm.validation.catalogue import CASES
+
+KNOWN_SHORT = {
+    # Points crowd where the flow turns sharply and stays (docs/validation.md): part of the momentum stays behind.
+    "jet": ("vertical, deflector and ground", "error of F_y"),
+    "bore": ("speed of the bore",),
+    # A skeleton without rate dependence runs out too far when it falls from high.
+    "collapse": ("a = 4: run-out", "a = 2: run-out"),
+}
+"""Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
+
+
+def unexpected(case, quick):
+    outcome = case.run(quick)
+    assert outcome.checks
+    known = KNOWN_SHORT.get(case.name, ())
+    return [
+        f"{check.quantity}: {check.ours:.6g} {check.unit}, reference {check.reference}, error {check.error}"
+        for check in outcome.short
+        if not any(words in check.quantity for words in known)
+    ]
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.in_quick], ids=lambda case: case.name)
+def test_quick(case):
+    assert unexpected(case, quick=True) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_full(case):
+    assert unexpected(case, quick=False) == []
