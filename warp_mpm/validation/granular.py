@@ -98,9 +98,8 @@ def collapse(quick: bool) -> Outcome:
         run_outs.append(front)
         low, high = run_out_band(ratio)
         reason = (
-            "a skeleton whose friction does not grow with the rate runs out too far when it falls from high"
-            if front > high
-            else "the spacing still rounds off the thin toe"
+            "no single angle of friction serves all ratios: low columns stop early and tall ones run far, because the "
+            "skeleton's friction does not grow with the rate of shearing"
         )
         checks.append(within(f"a = {ratio:g}: run-out", "L_0", front, low, high, remark=reason))
         checks.append(
