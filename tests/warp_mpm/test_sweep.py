@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from warp_mpm.cli import app
 from warp_mpm.scenario import Scenario
 from warp_mpm.sweep import Sweep, SweepError, run_sweep
-from warp_mpm.sweep.engine import TABLE
+from warp_mpm.sweep.engine import TABLE, run_case
 
 SET_IIB = Path(__file__).parents[2] / "scenarios/set_iib.json"
 MASS = "barrier.motion.density_kg_per_m3"
@@ -186,6 +186,16 @@ def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster
     assert again == []
     with pytest.raises(SweepError, match="holds another sweep"):
         run_sweep(load(sweep_of("grid", {SPEED: {"values": [10]}})), base, out, scheduler=address)
+
+
+def test_a_case_asked_for_again_is_not_run_again(tmp_path, flying_points):
+    # Dask asks once more for a result that was lost with its worker; the rows told before must stay true.
+    scenario, folder = Scenario.load(SET_IIB).resolved(), tmp_path / "case"
+    assert run_case(scenario, str(folder), make_simulation=lambda scene: flying_points(scene, fail_at=0.5))
+    assert run_case(scenario, str(folder), make_simulation=flying_points) is None
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    assert run_case(scenario, str(folder), make_simulation=flying_points) is None
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
 def test_only_what_is_missing_is_run_again(tmp_path, load, cluster, by_value):

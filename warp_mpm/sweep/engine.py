@@ -105,9 +105,13 @@ def run_case(
 ) -> str | None:
     """Run one case into its folder, in a worker; returns what went wrong, or None.
 
-    What an earlier worker left there, which died, is replaced.
+    What an earlier worker left there, which died, is replaced; but where it had finished the case (Dask asks again for
+    a result that was lost with its worker) the run is kept.
     """
     path = Path(folder)
+    with contextlib.suppress(ResultsError):
+        if Results.open(path).record.get("status") == "finished":
+            return None
 
     def simulation(scene: Scenario) -> Any:
         from warp_mpm.simulation import Simulation
