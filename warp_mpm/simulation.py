@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import sys
@@ -10,7 +9,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,13 +17,19 @@ from numpy.typing import NDArray
 
 from .discretization import material_points
 from .effect_rules import derive_effects
-from .grid import barrier_planes, contact_nodes, fit_grid, open_corner_volumes
+from .grid import fit_grid
 from .kernels import layout as at
 from .kernels.build import build_kernels
-from .kernels.mohr_coulomb import yield_constants
 from .kernels.pore_pressure import LEAST_POROSITY
-from .scenario import STANDARD_GRAVITY, Prescribed, Scenario, Sliding, Trapezoid
+from .scenario import Scenario
+from .state import saved
+from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
+from .state.divergence import NAMES, SimulationDiverged, what_diverged
+from .state.parameters import kernel_parameters
+from .state.samples import Constants, Totals, sample
 from .time_step import step_limits
+
+__all__ = ["Simulation", "SimulationDiverged"]
 
 
 @cache
@@ -50,10 +54,6 @@ def _start_warp() -> None:
                     os.write(2, line)
     finally:
         os.close(stderr)
-
-
-class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
-    """The run left the range of sense; the message says when and what to try."""
 
 
 class Simulation:
@@ -86,206 +86,44 @@ class Simulation:
         self._limits = step_limits(scenario)
         # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
         self._workers = 1 if self.device.is_cpu else 65536
-        self._parameters = self._make_parameters()
-        self._make_points()
-        self._make_grid()
-        self._make_barrier()
-        self._make_clock()
+        self._parameters = kernel_parameters(
+            scenario, self.effects, self._types, grid=self.grid, limits=self._limits, workers=self._workers
+        )
+        self._initial = material_points(scenario)
+        self.material_points = len(self._initial.volume)
+        self._make_arrays()
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
         self._kernels_of_a_step: tuple[str, ...] = ()
+        mass = scenario.barrier.mass if scenario.barrier is not None else None
+        weight = -mass * scenario.gravity.vector[1] if mass is not None else None
+        self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
         self._last = self._totals()
-        mass = self._initial.solid_mass.sum() + self._initial.liquid_mass.sum()
-        self._initial_momentum = mass * np.array(scenario.flow.velocity_m_per_s)
+        flow_mass = float(self._initial.solid_mass.sum() + self._initial.liquid_mass.sum())
+        self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
-    # -- construction ------------------------------------------------------------------------------------------
-
-    def _make_parameters(self) -> Any:
-        scenario, effects = self.scenario, self.effects
-        material, numerics = scenario.flow.material, scenario.numerics
-        parameters = self._types.Parameters()
-        young, nu = material.young_modulus_Pa, material.poisson_ratio
-        shear = young / (2.0 * (1.0 + nu))
-        lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
-        speed_per_cell = self._limits.sound_speed / numerics.spacing_m
-        values: dict[str, Any] = {
-            "spacing": numerics.spacing_m,
-            "inverse_spacing": 1.0 / numerics.spacing_m,
-            "left": self.grid.left,
-            "bottom": self.grid.bottom,
-            "columns": self.grid.columns,
-            "rows": self.grid.rows,
-            "block_rows": self.grid.rows // at.BLOCK,
-            "workers": self._workers,
-            "gravity": self._types.V2(*scenario.gravity.vector),
-            "solid_density": material.density if effects.formulation == "undrained" else material.solid_partial_density,
-            "lame": lame,
-            "shear_modulus": shear,
-            "bulk_modulus": lame + 2.0 / 3.0 * shear,
-            "wave_speed": self._limits.wave_speed,
-            "courant_number": numerics.courant_number,
-            "largest_stable_step": self._limits.drag_step,
-            "pic_rate": numerics.pic_share * speed_per_cell,
-        }
-        if effects.plasticity:
-            values |= yield_constants(
-                lame=lame,
-                shear_modulus=shear,
-                friction_angle=math.radians(material.friction_angle_deg),
-                dilatancy_angle=math.radians(material.dilatancy_angle_deg),
-                cohesion=material.cohesion_Pa,
-                tension_cutoff=material.tension_cutoff_Pa,
-            )
-        if effects.bulk_viscosity:
-            values["bulk_viscosity"] = (
-                numerics.bulk_viscosity * material.density * self._limits.sound_speed * numerics.spacing_m
-            )
-        if effects.liquid:
-            liquid: Any = material
-            values["porosity"] = material.porosity
-            values["true_liquid_density"] = liquid.liquid_density_kg_per_m3
-            values["liquid_bulk_modulus"] = liquid.liquid_bulk_modulus_Pa
-            values["cavitation_pressure"] = liquid.cavitation_pressure_Pa
-            if scenario.barrier is not None:
-                shape = scenario.barrier.shape
-                values["crest_end"] = shape.polygon[2, 0] if isinstance(shape, Trapezoid) else 0.0
-            values["relaxation_rate"] = numerics.pressure_relaxation * speed_per_cell
-        if effects.two_phase:
-            two: Any = material
-            n, solid, water = two.porosity, two.solid_partial_density, two.liquid_partial_density
-            coefficient = n**2 * two.liquid_density_kg_per_m3 * STANDARD_GRAVITY / two.hydraulic_conductivity
-            values["liquid_density"] = water
-            values["drag_coefficient"] = coefficient
-            values["drag_rate"] = coefficient * (1.0 / solid + 1.0 / water)
-        if scenario.ground is not None:
-            values["ground_row"] = self.grid.ground_row
-            values["ground_friction"] = scenario.ground.friction
-        if effects.ceiling:
-            top = scenario.domain.top_m
-            above = self.grid.rows - 4 if top is None else round((top - self.grid.bottom) / self.grid.spacing)
-            values["ceiling_row"] = above - 1
-        if effects.side_walls:
-            far = 1e6 * self.grid.spacing * self.grid.columns
-            domain = scenario.domain
-            x_right = self.grid.left + self.grid.columns * self.grid.spacing
-            left = domain.left_m if domain.left_m is not None else self.grid.left + 4 * self.grid.spacing
-            right = domain.right_m if domain.right_m is not None else x_right - 4 * self.grid.spacing
-            values["left_wall"] = left if domain.left_edge == "wall" else -far
-            values["right_wall"] = right if domain.right_edge == "wall" else far
+    def _make_arrays(self) -> None:
+        scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
+        bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
+        points = point_arrays(scenario, effects, types, self._initial, liquid_bulk_modulus=bulk_modulus, device=device)
+        self._points, self._point_arrays = points.structure, points.arrays
+        grid = grid_arrays(scenario, effects, types, self.grid, device=device)
+        self._grid, self._grid_arrays = grid.structure, grid.arrays
+        self._contact_count, self._contact_arrays = 0, {}
         if scenario.barrier is not None:
-            planes = {surface: (normal, offset) for surface, normal, offset in barrier_planes(scenario.barrier)}
-            nowhere = ((0.0, 1.0), 1e30)
-            values["face_normal"] = self._types.V2(*planes[at.FACE][0])
-            values["crest_height"] = planes.get(at.TOP, nowhere)[1]
-            values["back_normal"] = self._types.V2(*planes.get(at.BACK, nowhere)[0])
-            values["back_offset"] = planes.get(at.BACK, nowhere)[1]
-        if effects.barrier == "sliding":
-            assert scenario.barrier is not None
-            assert isinstance(scenario.barrier.motion, Sliding)
-            mass = scenario.barrier.mass
-            assert mass is not None
-            values["barrier_mass"] = mass
-            values["barrier_weight"] = -mass * scenario.gravity.vector[1]
-            values["barrier_pull"] = mass * scenario.gravity.vector[0]
-            values["base_friction"] = scenario.barrier.motion.base_friction_coefficient
-        for name, value in values.items():
-            setattr(parameters, name, value)
-        return parameters
-
-    def _array(self, values: Any, dtype: Any) -> Any:
-        return wp.array(values, dtype=dtype, device=self.device)
-
-    def _empty(self, fields: dict[str, Any], name: str, shape: Any) -> Any:
-        return wp.zeros(shape, dtype=fields[name].dtype, device=self.device)
-
-    def _make_points(self) -> None:
-        types, effects = self._types, self.effects
-        initial = material_points(self.scenario)
-        self._initial = initial
-        count = len(initial.volume)
-        velocity = np.tile(np.array(self.scenario.flow.velocity_m_per_s), (count, types.components // 2))
-        given = {
-            "position": initial.position,
-            "velocity": velocity,
-            "stress": initial.effective_stress,
-            "reference_volume": initial.volume,
-            "volume": initial.volume,
-            "inside": np.ones(count, dtype=np.int32),
-        }
-        if effects.liquid:
-            given["liquid_strain"] = -initial.pore_pressure / self._parameters.liquid_bulk_modulus
-        self._points = types.Points()
-        self._point_arrays = {}
-        for name in types.point_fields:
-            if name in given:
-                array = self._array(given[name], types.point_fields[name].dtype)
-            else:
-                array = self._empty(types.point_fields, name, count)
-            setattr(self._points, name, array)
-            self._point_arrays[name] = array
-        self.material_points = count
-
-    def _make_grid(self) -> None:
-        types = self._types
-        blocks = (self.grid.columns // at.BLOCK, self.grid.rows // at.BLOCK)
-        shapes = {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1}
-        self._grid = types.Grid()
-        self._grid_arrays = {}
-        for name in types.grid_fields:
-            if name == "corner_room":
-                array = self._array(1.0 / open_corner_volumes(self.scenario, self.grid), types.scalar)
-            else:
-                shape = shapes.get(name, (self.grid.columns, self.grid.rows))
-                array = self._empty(types.grid_fields, name, shape)
-            setattr(self._grid, name, array)
-            self._grid_arrays[name] = array
-
-    def _make_barrier(self) -> None:
-        types = self._types
-        self._contact_count = 0
-        self._contact_arrays: dict[str, Any] = {}
-        times, velocities = np.zeros(1), np.zeros(1)
-        if self.scenario.barrier is not None:
-            nodes = contact_nodes(self.scenario.barrier, self.grid)
-            self._contact_count = len(nodes.node)
-            given = {
-                "node": nodes.node,
-                "mirror": nodes.mirror,
-                "normal": nodes.normal,
-                "surface": nodes.surface,
-                "friction": nodes.friction,
-            }
-            self._contact = types.Contact()
-            for name, field in types.contact_fields.items():
-                if name in given:
-                    array = self._array(given[name], field.dtype)
-                else:
-                    array = self._empty(types.contact_fields, name, self._contact_count)
-                setattr(self._contact, name, array)
-                self._contact_arrays[name] = array
-            motion = self.scenario.barrier.motion
-            if isinstance(motion, Prescribed):
-                times, velocities = np.array(motion.times_s), np.array(motion.velocities_m_per_s)
-        self._times = self._array(times, wp.float64)
-        self._velocities = self._array(velocities, wp.float64)
-
-    def _make_clock(self) -> None:
-        clock = np.zeros(at.CLOCK_SIZE)
-        clock[at.SMALLEST_TIME_STEP] = math.inf
-        clock[at.SPEED_MAX] = self.scenario.flow.speed**2 * (2.0 if self.effects.two_phase else 1.0)
-        solid, liquid = float(self._initial.solid_mass.sum()), float(self._initial.liquid_mass.sum())
-        if not self.effects.two_phase:
-            solid, liquid = solid + liquid, 0.0
-        clock[at.INITIAL_MASS_SOLID] = clock[at.ACTIVE_MASS_SOLID] = solid
-        clock[at.INITIAL_MASS_LIQUID] = clock[at.ACTIVE_MASS_LIQUID] = liquid
-        self._clock = self._array(clock, wp.float64)
-        self._counters = wp.zeros(at.COUNTERS_SIZE, dtype=wp.int32, device=self.device)
-        self._running = wp.zeros(1, dtype=wp.int32, device=self.device)
-        self._reactions = wp.zeros(2 * at.SURFACES, dtype=wp.float64, device=self.device)
-        self._left = wp.zeros(at.LEFT_SIZE, dtype=wp.float64, device=self.device)
-        self._sums = wp.zeros(at.LEDGER_SIZE, dtype=wp.float64, device=self.device)
-        self._target = wp.zeros(1, dtype=wp.float64, device=self.device)
+            contact = contact_arrays(scenario.barrier, types, self.grid, device=device)
+            self._contact, self._contact_arrays = contact.structure, contact.arrays
+            self._contact_count = len(contact.arrays["node"])
+        self._clock_arrays = clock_arrays(scenario, effects, self._initial, device=device)
+        self._clock = self._clock_arrays["clock"]
+        self._counters = self._clock_arrays["counters"]
+        self._running = self._clock_arrays["running"]
+        self._reactions = self._clock_arrays["reactions"]
+        self._left = self._clock_arrays["left"]
+        self._sums = self._clock_arrays["sums"]
+        self._times = self._clock_arrays["times"]
+        self._velocities = self._clock_arrays["velocities"]
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
@@ -372,9 +210,7 @@ class Simulation:
         """Every array that the simulation holds on the device, by name, with its bytes."""
         groups = {"points": self._point_arrays, "grid": self._grid_arrays, "contact": self._contact_arrays}
         held = {f"{group}.{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
-        for name in ("clock", "counters", "running", "reactions", "left", "sums", "target", "times", "velocities"):
-            held[name] = getattr(self, f"_{name}")
-        return {name: int(array.capacity) for name, array in held.items()}
+        return {name: int(array.capacity) for name, array in (held | self._clock_arrays).items()}
 
     @property
     def blocks_in_use(self) -> float:
@@ -390,7 +226,7 @@ class Simulation:
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
-        wp.copy(self._clock, self._array(np.array([until]), wp.float64), dest_offset=at.TARGET, count=1)
+        self._set_clock_entry(at.TARGET, until)
         self._prepare()
         wp.capture_launch(self._graph)
         if int(self._counters.numpy()[at.DIVERGED]):
@@ -402,7 +238,7 @@ class Simulation:
         Launches are prepared beforehand; what is left of their own cost, a few microseconds, is that of `forget`, which
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
-        wp.copy(self._clock, self._array(np.array([until]), wp.float64), dest_offset=at.TARGET, count=1)
+        self._set_clock_entry(at.TARGET, until)
         self._commands = []
         self._start()
         self._step()
@@ -419,35 +255,12 @@ class Simulation:
         return spent
 
     def _what_diverged(self) -> str:
-        """When, which quantity, where, and what to try."""
-        names = {
-            "velocity": "the velocity",
-            "stress": "the effective stress",
-            "liquid_strain": "the pore pressure",
-            "volume": "the volume",
-            "position": "the position",
-        }
-        arrays = {name: self._point_arrays[name].numpy() for name in names if name in self._point_arrays}
-        found, place = "", None
-        for name, values in arrays.items():
-            bad = ~np.isfinite(values.reshape(self.material_points, -1)).all(axis=1)
-            if bad.any():
-                known = arrays["position"][bad & np.isfinite(arrays["position"]).all(axis=1)]
-                found = f"{names[name]} of {bad.sum()} of {self.material_points} material points is not a finite number"
-                place = known[0] if len(known) else None
-                break
-        if not found:
-            speed = np.abs(arrays["velocity"]).max(axis=1)
-            fastest = int(speed.argmax())
-            found = f"the speed of a material point passed {at.FASTEST:g} m/s"
-            place = arrays["position"][fastest]
-            if speed[fastest] < 0.1 * at.FASTEST:
-                found, place = f"the barrier's velocity is {self.barrier_velocity:g} m/s", None
-        where = "" if place is None else f", near x = {place[0]:.3g} m, y = {place[1]:.3g} m"
-        return (
-            f"The run diverged at t = {self.time:.6g} s (step {self.steps}): {found}{where}. Try a smaller "
-            f"numerics.courant_number (now {self.scenario.numerics.courant_number:g}) or a finer numerics.spacing_m "
-            f"(now {self.scenario.numerics.spacing_m:g})."
+        return what_diverged(
+            {name: self._point_arrays[name].numpy() for name in NAMES if name in self._point_arrays},
+            time=self.time,
+            steps=self.steps,
+            barrier_velocity=self.barrier_velocity,
+            numerics=self.scenario.numerics,
         )
 
     def set_points(self, **state: NDArray[np.float64]) -> None:
@@ -472,10 +285,11 @@ class Simulation:
                 raise ValueError(f"set_points needs finite {name} of shape {now[name].shape}, not {np.shape(values)}")
         now |= state
         velocity, solid, liquid = now["solid_velocity"], now["solid_mass"], now["liquid_mass"]
-        self._initial_momentum = (solid + liquid) @ velocity
+        momentum = (solid + liquid) @ velocity
         if self.effects.two_phase:
-            self._initial_momentum = solid @ velocity + liquid @ now["liquid_velocity"]
+            momentum = solid @ velocity + liquid @ now["liquid_velocity"]
             velocity = np.concatenate([velocity, now["liquid_velocity"]], axis=1)
+        self._initial_momentum = momentum.tolist()
         self._point_arrays["velocity"].assign(velocity)
         self._point_arrays["stress"].assign(now["effective_stress"])
         if self.effects.liquid:
@@ -488,6 +302,9 @@ class Simulation:
 
     def _clock_entry(self, entry: int) -> float:
         return float(self._clock.numpy()[entry])
+
+    def _set_clock_entry(self, entry: int, value: float) -> None:
+        self._clock[entry : entry + 1].fill_(float(value))
 
     @property
     def time(self) -> float:
@@ -519,7 +336,7 @@ class Simulation:
         """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
         if self.effects.barrier != "sliding":
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
-        wp.copy(self._clock, self._array(np.array([force]), wp.float64), dest_offset=at.EXTERNAL_FORCE, count=1)
+        self._set_clock_entry(at.EXTERNAL_FORCE, force)
 
     def points(self) -> dict[str, NDArray[np.float64]]:
         """State of the N material points still in the domain, as float64 arrays in SI units.
@@ -557,8 +374,8 @@ class Simulation:
             )
         return state
 
-    def _totals(self) -> SimpleNamespace:
-        return SimpleNamespace(clock=self._clock.numpy().copy(), reactions=self._reactions.numpy().copy())
+    def _totals(self) -> Totals:
+        return Totals(self._clock.numpy().tolist(), self._reactions.numpy().tolist())
 
     def sample(self) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval).
@@ -570,77 +387,20 @@ class Simulation:
         """
         self._sums.zero_()
         self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
-        sums = self._sums.numpy()
+        sums = self._sums.numpy().tolist()
         if sums[at.LEDGER_NOT_FINITE] > 0.0:
             raise SimulationDiverged(self._what_diverged())
         totals = self._totals()
-        clock, reactions = totals.clock, totals.reactions
-        elapsed = clock[at.TIME] - self._last.clock[at.TIME]
-        rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
-        forces = (reactions - self._last.reactions) * rate
-        left = self._left.numpy()
-        values: dict[str, float] = {"time": clock[at.TIME]}
-        momentum_x, momentum_y = sums[at.LEDGER_MOMENTUM_X], sums[at.LEDGER_MOMENTUM_Y]
-        residual_x = momentum_x - self._initial_momentum[0] - clock[at.GRAVITY_IMPULSE_X] + left[at.LEFT_MOMENTUM_X]
-        residual_y = momentum_y - self._initial_momentum[1] - clock[at.GRAVITY_IMPULSE_Y] + left[at.LEFT_MOMENTUM_Y]
-        residual_x += reactions[0::2].sum()
-        residual_y += reactions[1::2].sum()
-        if self.effects.barrier != "none":
-            values |= {
-                "impact_force_x": forces[2 * at.FACE],
-                "impact_force_y": forces[2 * at.FACE + 1],
-                "top_force_x": forces[2 * at.TOP],
-                "top_force_y": forces[2 * at.TOP + 1],
-                "back_force_x": forces[2 * at.BACK],
-                "back_force_y": forces[2 * at.BACK + 1],
-                "barrier_velocity": clock[at.BARRIER_VELOCITY],
-                "barrier_displacement": clock[at.GRID_SHIFT],
-                "barrier_work": clock[at.BARRIER_WORK],
-            }
-        if self.effects.barrier == "sliding":
-            assert self.scenario.barrier is not None
-            mass = self.scenario.barrier.mass
-            assert mass is not None
-            friction = clock[at.BASE_FRICTION_IMPULSE] - self._last.clock[at.BASE_FRICTION_IMPULSE]
-            vertical = sum(forces[2 * surface + 1] for surface in (at.FACE, at.TOP, at.BACK))
-            values |= {
-                "base_force": -friction * rate,
-                "base_normal_force": max(self._parameters.barrier_weight - vertical, 0.0),
-                "base_friction_work": clock[at.BASE_FRICTION_WORK],
-                "barrier_kinetic_energy": 0.5 * mass * clock[at.BARRIER_VELOCITY] ** 2,
-            }
-        if self.effects.ground != "none":
-            values |= {
-                "ground_force_x": forces[2 * at.GROUND],
-                "ground_force_y": forces[2 * at.GROUND + 1],
-            }
-        values |= {
-            "flow_kinetic_energy": sums[at.LEDGER_KINETIC],
-            "flow_gravitational_energy": sums[at.LEDGER_GRAVITATIONAL],
-            "flow_elastic_energy": sums[at.LEDGER_ELASTIC],
-            "speed_max": math.sqrt(sums[at.LEDGER_SPEED_MAX]),
-            "solid_mass": sums[at.LEDGER_SOLID_MASS],
-        }
-        if self.effects.liquid:
-            values["pore_pressure_max_anywhere"] = sums[at.LEDGER_PRESSURE_MAX]
-            # What loads the barrier: upstream of the crest's end and meant over a cell. Where a jet lands behind it,
-            # single points meet the ground at water-hammer pressure.
-            values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MEAN]
-        if self.effects.two_phase:
-            values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
-        values |= {
-            "momentum_x": momentum_x,
-            "momentum_y": momentum_y,
-            "momentum_residual_x": residual_x,
-            "momentum_residual_y": residual_y,
-            "left_mass": left[at.LEFT_SOLID_MASS] + left[at.LEFT_LIQUID_MASS],
-            "left_momentum_x": left[at.LEFT_MOMENTUM_X],
-            "left_momentum_y": left[at.LEFT_MOMENTUM_Y],
-            "left_energy": left[at.LEFT_ENERGY],
-            "time_step": clock[at.TIME_STEP],
-        }
+        values = sample(
+            self._constants,
+            totals,
+            self._last,
+            sums=sums,
+            left=self._left.numpy().tolist(),
+            initial_momentum=self._initial_momentum,
+        )
         self._last = totals
-        return {name: float(value) for name, value in values.items()}
+        return values
 
     @property
     def record(self) -> dict[str, Any]:
@@ -673,11 +433,8 @@ class Simulation:
         return arrays
 
     def save_state(self) -> bytes:
-        """Everything that the run needs to go on, bit for bit (on the CPU): a line of JSON that lists the arrays, then
-        their numbers."""
-        state = self._state()
-        listed = [[name, values.dtype.str, list(values.shape)] for name, values in state.items()]
-        return json.dumps(listed).encode() + b"\n" + b"".join(values.tobytes() for values in state.values())
+        """Everything that the run needs to go on, bit for bit (on the CPU)."""
+        return saved.packed(self._state())
 
     def restore_state(self, data: bytes) -> None:
         """Go back to a state from `save_state` of a simulation of the same scenario.
@@ -685,25 +442,17 @@ class Simulation:
         Raises:
             ValueError: the state belongs to another scene or is damaged; nothing was changed.
         """
-        listed, _, numbers = data.partition(b"\n")
-        state = self._state()
-        expected = [[name, values.dtype.str, list(values.shape)] for name, values in state.items()]
-        if listed != json.dumps(expected).encode():
-            raise ValueError("the state does not fit this scenario: its arrays are others, or of other sizes")
-        if len(numbers) != sum(values.nbytes for values in state.values()):
-            raise ValueError("the state is damaged: it is not as long as its arrays")
-        arrays, begin = self._state_arrays(), 0
-        for name, now in state.items():
-            values = np.frombuffer(numbers, now.dtype, now.size, begin).reshape(now.shape)
-            begin += now.nbytes
-            if name in arrays:
-                arrays[name].assign(values)
-            else:
-                state[name] = values.copy()
-        self._initial_momentum = state["initial_momentum"]
-        self._last = SimpleNamespace(clock=state["last.clock"], reactions=state["last.reactions"])
+        state = saved.unpacked(data, self._state())
+        for name, array in self._state_arrays().items():
+            array.assign(state[name])
+        self._initial_momentum = state["initial_momentum"].tolist()
+        self._last = Totals(state["last.clock"].tolist(), state["last.reactions"].tolist())
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
-        kept = {"last.clock": self._last.clock, "last.reactions": self._last.reactions}
-        return state | kept | {"initial_momentum": np.asarray(self._initial_momentum, dtype=np.float64)}
+        kept = {
+            "last.clock": self._last.clock,
+            "last.reactions": self._last.reactions,
+            "initial_momentum": self._initial_momentum,
+        }
+        return state | {name: np.array(values) for name, values in kept.items()}

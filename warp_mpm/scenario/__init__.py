@@ -1,0 +1,48 @@
+"""A scenario: what the user asks for, in SI units, checked before anything is created.
+
+The layout of the JSON file is the layout of the models below; `python -m warp_mpm schema` prints it as JSON Schema.
+Coordinates: the toe of the barrier's upstream face is the origin, the ground is y = 0, the flow comes from x < 0 and
+moves toward +x. All forces, masses and volumes are per metre of width.
+"""
+
+from warp_mpm.scenario.barrier import Barrier, Fixed, Prescribed, Sliding, SurfaceFriction, Trapezoid, Wall
+from warp_mpm.scenario.flow import (
+    DryFlow,
+    Flow,
+    FlowPolygon,
+    FrontAndTail,
+    Skeleton,
+    TwoPhaseFlow,
+    TwoPhaseMaterial,
+    UndrainedFlow,
+    UndrainedMaterial,
+)
+from warp_mpm.scenario.scene import Scenario, json_schema
+from warp_mpm.scenario.settings import STANDARD_GRAVITY, Domain, Gravity, Ground, Numerics, Output
+
+__all__ = [
+    "STANDARD_GRAVITY",
+    "Barrier",
+    "Domain",
+    "DryFlow",
+    "Fixed",
+    "Flow",
+    "FlowPolygon",
+    "FrontAndTail",
+    "Gravity",
+    "Ground",
+    "Numerics",
+    "Output",
+    "Prescribed",
+    "Scenario",
+    "Skeleton",
+    "Sliding",
+    "SurfaceFriction",
+    "Trapezoid",
+    "TwoPhaseFlow",
+    "TwoPhaseMaterial",
+    "UndrainedFlow",
+    "UndrainedMaterial",
+    "Wall",
+    "json_schema",
+]

@@ -1,0 +1,228 @@
+"""The flow: its outline, its material and its formulation."""
+
+# ruff: noqa: N815 - a unit at the end of a field's name keeps its own spelling (Pa)
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from warp_mpm import geometry
+from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity
+from warp_mpm.scenario.settings import STANDARD_GRAVITY
+
+
+class FrontAndTail(Model):
+    """The paper's flow: a front at 45°, `squares` squares of the flow's depth, a tail of three depths."""
+
+    kind: Literal["front_and_tail"]
+    depth_m: Length
+    """Flow depth h."""
+    squares: Annotated[int, Field(ge=0, le=100_000)]
+    """Number i of squares between front and tail. Volume (2 + i) h² per metre of width."""
+    distance_m: Annotated[float, Field(ge=0.0, le=1e6)]
+    """Distance d from the front's toe to the barrier's toe."""
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres."""
+        return geometry.front_and_tail(self.depth_m, self.squares, self.distance_m)
+
+
+class FlowPolygon(Model):
+    """A flow of any outline."""
+
+    kind: Literal["polygon"]
+    vertices_m: Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=2000)]
+    """Corners [x, y], in order around the outline, the last joining the first."""
+
+    @model_validator(mode="after")
+    def _simple(self) -> Self:
+        crossing = geometry.crossing_edges(self.polygon)
+        if crossing is not None:
+            first, second = crossing
+            raise ValueError(
+                f"vertices_m must not cross or touch themselves; the side after corner {first + 1} meets "
+                f"the side after corner {second + 1}"
+            )
+        if not geometry.area(self.polygon) > 0.0:
+            raise ValueError("vertices_m must enclose an area greater than 0")
+        return self
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres."""
+        return np.array(self.vertices_m)
+
+
+class Skeleton(Model):
+    """Solid grains and their skeleton: linear elastic, non-associative Mohr–Coulomb."""
+
+    grain_density_kg_per_m3: Density
+    """Density of the grains themselves. The dry (partial) density is (1 - n) times this."""
+    porosity: Annotated[float, Field(gt=0.0, lt=1.0)]
+    """Volume of the voids over the total volume, n."""
+    young_modulus_Pa: Positive
+    """Young's modulus E' of the drained skeleton."""
+    poisson_ratio: Annotated[float, Field(gt=-1.0, lt=0.5)]
+    """Poisson's ratio ν of the drained skeleton."""
+    friction_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)]
+    """Internal friction angle φ'."""
+    cohesion_Pa: NonNegative = 0.0
+    """Effective cohesion c'."""
+    dilatancy_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 0.0
+    """Dilatancy angle ψ, at most the friction angle."""
+    tension_cutoff_Pa: NonNegative = 0.0
+    """Largest tensile principal effective stress."""
+    plasticity: bool = True
+    """False leaves the skeleton elastic."""
+
+    @model_validator(mode="after")
+    def _flow_rule(self) -> Self:
+        if self.dilatancy_angle_deg > self.friction_angle_deg:
+            raise ValueError(
+                f"dilatancy_angle_deg = {self.dilatancy_angle_deg:g} must not exceed "
+                f"friction_angle_deg = {self.friction_angle_deg:g}"
+            )
+        return self
+
+    @property
+    def solid_partial_density(self) -> float:
+        """Mass of solid per volume of the whole, (1 - n) ρ_grain [kg/m³]."""
+        return (1.0 - self.porosity) * self.grain_density_kg_per_m3
+
+    @property
+    def liquid_partial_density(self) -> float:
+        """Mass of liquid per volume of the whole, n ρ_L [kg/m³]; 0 for a dry flow."""
+        return 0.0
+
+    @property
+    def density(self) -> float:
+        """Density of the whole, ρ_m [kg/m³]."""
+        return self.solid_partial_density + self.liquid_partial_density
+
+    @property
+    def oedometric_modulus(self) -> float:
+        """E (1 - ν) / ((1 + ν)(1 - 2ν)) [Pa]."""
+        nu = self.poisson_ratio
+        return self.young_modulus_Pa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+
+class UndrainedMaterial(Skeleton):
+    """A skeleton whose voids are full of liquid that cannot leave them."""
+
+    liquid_density_kg_per_m3: Density
+    """Density ρ_L of the liquid."""
+    liquid_bulk_modulus_Pa: Positive
+    """Bulk modulus K_L of the liquid."""
+    cavitation_pressure_Pa: NonNegative = 0.0
+    """Largest tension that the liquid bears before it cavitates."""
+
+    @property
+    def liquid_partial_density(self) -> float:
+        """Mass of liquid per volume of the whole, n ρ_L [kg/m³]."""
+        return self.porosity * self.liquid_density_kg_per_m3
+
+
+class TwoPhaseMaterial(UndrainedMaterial):
+    """A saturated skeleton through which the liquid moves by Darcy's law.
+
+    The drag follows from `hydraulic_conductivity_m_per_s`, or from `intrinsic_permeability_m2` and
+    `liquid_viscosity_Pa_s`; exactly one of the two ways is given.
+    """
+
+    hydraulic_conductivity_m_per_s: Positive | None = None
+    """Saturated hydraulic conductivity k_sat, at 9.81 m/s² whatever the scene's gravity."""
+    intrinsic_permeability_m2: Positive | None = None
+    """Intrinsic permeability κ, in place of the hydraulic conductivity."""
+    liquid_viscosity_Pa_s: Positive = 1e-3
+    """Dynamic viscosity μ_L. With the conductivity given it only tells the intrinsic permeability."""
+    porosity_update: bool = False
+    """True updates the porosity with the skeleton's volume strain; False keeps it, as the paper does (Eq. (A11))."""
+
+    @model_validator(mode="after")
+    def _one_conductivity(self) -> Self:
+        if (self.hydraulic_conductivity_m_per_s is None) == (self.intrinsic_permeability_m2 is None):
+            raise ValueError("needs exactly one of hydraulic_conductivity_m_per_s and intrinsic_permeability_m2")
+        return self
+
+    @property
+    def hydraulic_conductivity(self) -> float:
+        """k_sat [m/s] at 9.81 m/s², given or from κ ρ_L g / μ_L."""
+        if self.hydraulic_conductivity_m_per_s is not None:
+            return self.hydraulic_conductivity_m_per_s
+        assert self.intrinsic_permeability_m2 is not None
+        weight = self.liquid_density_kg_per_m3 * STANDARD_GRAVITY
+        return self.intrinsic_permeability_m2 * weight / self.liquid_viscosity_Pa_s
+
+
+class _FlowBase(Model):
+    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")]
+    """Outline at t = 0."""
+    velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)]
+    """Uniform velocity [x, y] at t = 0, of both phases."""
+    initial_stress: Literal["geostatic", "zero"] = "geostatic"
+    """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
+    lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    """K0, horizontal over vertical effective stress at t = 0; null: Jaky's 1 - sin φ'."""
+
+    material: Skeleton
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Outline at t = 0, vertices [V, 2] in metres."""
+        return self.shape.polygon
+
+    @property
+    def lateral_stress_ratio(self) -> float:
+        """K0 [-], given or 1 - sin φ'."""
+        if self.lateral_stress_coefficient is not None:
+            return self.lateral_stress_coefficient
+        return 1.0 - math.sin(math.radians(self.material.friction_angle_deg))
+
+    @property
+    def volume(self) -> float:
+        """Volume V_1 [m³/m]."""
+        return geometry.area(self.polygon)
+
+    @property
+    def depth(self) -> float:
+        """Flow depth h [m]: the greatest vertical thickness of the outline."""
+        return self.shape.depth_m if isinstance(self.shape, FrontAndTail) else geometry.maximum_depth(self.polygon)
+
+    @property
+    def equivalent_length(self) -> float:
+        """Length L_m [m] of the box of the same volume and depth."""
+        return self.volume / self.depth
+
+    @property
+    def speed(self) -> float:
+        """Magnitude of the initial velocity [m/s]."""
+        return math.hypot(*self.velocity_m_per_s)
+
+
+class TwoPhaseFlow(_FlowBase):
+    """Saturated flow, solid and liquid with their own velocities (a_S–a_L formulation)."""
+
+    formulation: Literal["two_phase"]
+    material: TwoPhaseMaterial
+
+
+class UndrainedFlow(_FlowBase):
+    """Saturated flow, one velocity; the skeleton's volume strain drives the pore pressure."""
+
+    formulation: Literal["undrained"]
+    material: UndrainedMaterial
+
+
+class DryFlow(_FlowBase):
+    """Dry granular flow."""
+
+    formulation: Literal["dry"]
+    material: Skeleton
+
+
+Flow = TwoPhaseFlow | UndrainedFlow | DryFlow

@@ -1,0 +1,99 @@
+"""A whole scene."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from warp_mpm.scenario.barrier import Barrier
+from warp_mpm.scenario.checks import problems
+from warp_mpm.scenario.fields import Model
+from warp_mpm.scenario.flow import Flow
+from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output
+from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
+
+
+class Scenario(Model):
+    """A whole scene. `Scenario.load(path)` reads one; `Scenario.model_validate(dict)` makes one from Python."""
+
+    title: Annotated[str, Field(min_length=1, max_length=200)]
+    """One line that names the scene."""
+    source: str = ""
+    """Where the scene's figures come from."""
+    notes: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    """Remarks, for instance on a figure of the source that had to be interpreted."""
+    gravity: Gravity = Gravity()
+    flow: Annotated[Flow, Field(discriminator="formulation")]
+    barrier: Barrier | None = None
+    """null: no barrier."""
+    ground: Ground | None = Ground()
+    """null: no ground, for instance for a free jet."""
+    domain: Domain = Domain()
+    numerics: Numerics = Numerics()
+    output: Output
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scenario:
+        """Read a scenario from a JSON file.
+
+        Raises:
+            ScenarioError: the file cannot be read, is no JSON, or says something impossible; one sentence per problem.
+        """
+        return cls.model_validate(read_json(Path(path)), source_name=str(path))
+
+    @classmethod
+    def model_validate(cls, obj: Any, *, source_name: str | None = None, **kwargs: Any) -> Scenario:
+        """Check `obj`, a dict of the file's layout, and make a Scenario of it.
+
+        Raises:
+            ScenarioError: with one sentence per problem, each naming field, value and what is allowed.
+        """
+        try:
+            return super().model_validate(obj, **kwargs)
+        except ValidationError as error:
+            raise ScenarioError(sentences(error, cls), source_name) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_schema_pointer(cls, data: Any) -> Any:
+        # "$schema" tells an editor where the JSON Schema lies; it says nothing about the scene.
+        return {key: value for key, value in data.items() if key != "$schema"} if isinstance(data, dict) else data
+
+    def resolved(self) -> dict[str, Any]:
+        """The scenario as a dict of plain JSON values with every default filled in; loads to an equal Scenario."""
+        return self.model_dump(mode="json")
+
+    def replaced(self, changes: Mapping[str, Any]) -> Scenario:
+        """A copy with some fields changed, named by their path: `{"numerics.spacing_m": 0.25}`.
+
+        Raises:
+            ScenarioError: a changed value is not allowed, or the path leads nowhere.
+        """
+        data = self.resolved()
+        for path, value in changes.items():
+            *parents, leaf = path.split(".")
+            place = data
+            for name in parents:
+                if not isinstance(place.get(name), dict):
+                    raise ScenarioError([f"{path} leads nowhere: this scenario has no group {name!r} there."])
+                place = place[name]
+            place[leaf] = value
+        return type(self).model_validate(data)
+
+    @model_validator(mode="after")
+    def _scene(self) -> Self:
+        found = problems(self)
+        if found:
+            raise ValueError("\n".join(found))
+        return self
+
+
+def json_schema() -> str:
+    """The scenario format as JSON Schema (draft 2020-12), indented text."""
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
+    schema["properties"] = {"$schema": {"type": "string"}, **schema["properties"]}
+    return json.dumps(schema, indent=2, ensure_ascii=False)

@@ -1,0 +1,90 @@
+"""Gravity, ground, the region that is followed, how the equations are solved and what is recorded."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from warp_mpm.scenario.fields import Coordinate, Friction, Interval, Model, NonNegative
+
+STANDARD_GRAVITY = 9.81
+"""Gravity [m/s²] to which a hydraulic conductivity refers, whatever the scene's own gravity."""
+
+
+class Gravity(Model):
+    """Gravity; tilted, it turns the ground (y = 0) into a slope without tilting the axes."""
+
+    acceleration_m_per_s2: Annotated[float, Field(ge=0.0, le=1000.0)] = STANDARD_GRAVITY
+    """Magnitude. 0 switches gravity off."""
+    tilt_deg: Annotated[float, Field(gt=-90.0, lt=90.0)] = 0.0
+    """Slope of the ground. Positive: the ground falls toward +x, gravity also pulls the flow downstream."""
+
+    @property
+    def vector(self) -> tuple[float, float]:
+        """Components along x and y [m/s²]."""
+        tilt = math.radians(self.tilt_deg)
+        return self.acceleration_m_per_s2 * math.sin(tilt), -self.acceleration_m_per_s2 * math.cos(tilt)
+
+
+class Ground(Model):
+    """Rigid, impermeable ground at y = 0."""
+
+    friction: Friction = 0.0
+    """Friction coefficient tan φ_b between the flow's solid and the ground; 0 is smooth, as in the paper."""
+
+
+class Domain(Model):
+    """Edges of the region in which the flow is followed. An extent left out is fitted to the scene."""
+
+    left_edge: Literal["open", "wall"] = "open"
+    """open: what crosses the edge leaves, and is counted; wall: smooth and impermeable."""
+    right_edge: Literal["open", "wall"] = "open"
+    top_edge: Literal["open", "wall"] = "open"
+    left_m: Coordinate | None = None
+    """x of the left edge."""
+    right_m: Coordinate | None = None
+    """x of the right edge."""
+    bottom_m: Coordinate | None = None
+    """y of the lower edge of a scene without ground, which is open; with ground it is the ground, y = 0."""
+    top_m: Coordinate | None = None
+    """y of the upper edge."""
+
+
+class Numerics(Model):
+    """How the equations are solved."""
+
+    spacing_m: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.2
+    """Side of the square cells of the background grid."""
+    points_per_cell: Literal[1, 4, 9, 16] = 4
+    """Material points in a full cell at t = 0."""
+    courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    """Share of the critical time step that is used, C_NB."""
+    transfer: Literal["flip", "apic"] = "apic"
+    """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, the paper's)."""
+    pic_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
+    drag: Literal["semi_implicit", "explicit"] = "semi_implicit"
+    """How the drag between the phases is integrated; explicit limits the time step at low conductivity."""
+    volumetric_smoothing: bool = True
+    """Volume strains are averaged over the grid, against volumetric locking."""
+    pressure_relaxation: NonNegative = 1.0
+    """Rate at which the noise of point pressures about their grid average decays, per sound crossing of a cell [-]."""
+    bulk_viscosity: Annotated[float, Field(ge=0.0, le=2.0)] = 0.2
+    """Artificial viscosity on compression, as a share b of rho c d (density, sound speed, spacing); 0 is none."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Floating-point numbers of the simulation."""
+
+
+class Output(Model):
+    """What is recorded, and when."""
+
+    end_time_s: Annotated[float, Field(gt=0.0, le=1e6)]
+    """Simulated time at which the run ends."""
+    time_series_interval_s: Interval = 0.005
+    """Interval of the time series; forces are means over it."""
+    snapshot_interval_s: Interval = 0.05
+    """Interval of the snapshots of all material points."""
+    checkpoint_interval_s: Interval | None = None
+    """Simulated time between checkpoints, from which an interrupted run goes on; null: one in 30 s of wall time."""

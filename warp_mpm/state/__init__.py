@@ -1,0 +1,1 @@
+"""What a simulation holds on the device, how it is made from a scene, and what is read from it."""

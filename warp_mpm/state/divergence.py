@@ -1,0 +1,59 @@
+"""A run that left the range of sense, and the sentence that says so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import layout as at
+from ..scenario import Numerics
+
+NAMES = {
+    "velocity": "the velocity",
+    "stress": "the effective stress",
+    "liquid_strain": "the pore pressure",
+    "volume": "the volume",
+    "position": "the position",
+}
+"""Arrays of the material points in which a divergence shows, by what they are called in a sentence."""
+
+
+class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
+    """The run left the range of sense; the message says when and what to try."""
+
+
+def what_diverged(
+    arrays: Mapping[str, NDArray[np.floating]], *, time: float, steps: int, barrier_velocity: float, numerics: Numerics
+) -> str:
+    """When, which quantity, where, and what to try.
+
+    Args:
+        arrays: those of the material points in `NAMES` that the scene has, N rows each.
+        time: simulated time [s].
+        steps: time steps so far.
+        barrier_velocity: [m/s].
+        numerics: the settings that could be changed.
+    """
+    found, place = "", None
+    for name, values in arrays.items():
+        bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+        if bad.any():
+            known = arrays["position"][bad & np.isfinite(arrays["position"]).all(axis=1)]
+            found = f"{NAMES[name]} of {bad.sum()} of {len(values)} material points is not a finite number"
+            place = known[0] if len(known) else None
+            break
+    if not found:
+        speed = np.abs(arrays["velocity"]).max(axis=1)
+        fastest = int(speed.argmax())
+        found = f"the speed of a material point passed {at.FASTEST:g} m/s"
+        place = arrays["position"][fastest]
+        if speed[fastest] < 0.1 * at.FASTEST:
+            found, place = f"the barrier's velocity is {barrier_velocity:g} m/s", None
+    where = "" if place is None else f", near x = {place[0]:.3g} m, y = {place[1]:.3g} m"
+    return (
+        f"The run diverged at t = {time:.6g} s (step {steps}): {found}{where}. Try a smaller "
+        f"numerics.courant_number (now {numerics.courant_number:g}) or a finer numerics.spacing_m "
+        f"(now {numerics.spacing_m:g})."
+    )

@@ -1,0 +1,37 @@
+"""A simulation's state as bytes: a line of JSON that lists the arrays, then their numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def packed(state: Mapping[str, NDArray[Any]]) -> bytes:
+    """The arrays as bytes, bit for bit."""
+    return _listed(state) + b"\n" + b"".join(values.tobytes() for values in state.values())
+
+
+def unpacked(data: bytes, like: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The arrays of `packed`, which must be those of `like` in name, type and shape.
+
+    Raises:
+        ValueError: they are others, or the data are damaged.
+    """
+    listed, _, numbers = data.partition(b"\n")
+    if listed != _listed(like):
+        raise ValueError("the state does not fit this scenario: its arrays are others, or of other sizes")
+    if len(numbers) != sum(values.nbytes for values in like.values()):
+        raise ValueError("the state is damaged: it is not as long as its arrays")
+    state, begin = {}, 0
+    for name, now in like.items():
+        state[name] = np.frombuffer(numbers, now.dtype, now.size, begin).reshape(now.shape)
+        begin += now.nbytes
+    return state
+
+
+def _listed(state: Mapping[str, NDArray[Any]]) -> bytes:
+    return json.dumps([[name, values.dtype.str, list(values.shape)] for name, values in state.items()]).encode()
