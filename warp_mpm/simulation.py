@@ -32,6 +32,18 @@ from .time_step import step_limits
 __all__ = ["Simulation", "SimulationDiverged"]
 
 
+STATE_OF_POINTS = (
+    "position",
+    "velocity",
+    "stress",
+    "reference_volume",
+    "volume",
+    "deviatoric_strain",
+    "liquid_strain",
+)
+"""Arrays of the material points from which `points` tells their state; the others are intermediate."""
+
+
 @cache
 def _start_warp() -> None:
     """Start Warp without its banner, and without its warning that a machine has no GPU, which is no fault of anyone's.
@@ -96,6 +108,7 @@ class Simulation:
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
         self._kernels_of_a_step: tuple[str, ...] = ()
+        self._ledger_graph: Any = None
         mass = scenario.barrier.mass if scenario.barrier is not None else None
         weight = -mass * scenario.gravity.vector[1] if mass is not None else None
         self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
@@ -124,6 +137,9 @@ class Simulation:
         self._sums = self._clock_arrays["sums"]
         self._times = self._clock_arrays["times"]
         self._velocities = self._clock_arrays["velocities"]
+        self._target = self._clock[at.TARGET : at.TARGET + 1]
+        # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
+        self._seen = {name: array.numpy() for name, array in self._clock_arrays.items()} if device.is_cpu else {}
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
@@ -187,17 +203,25 @@ class Simulation:
         self._start()
         wp.capture_while(self._running, self._step)
 
+    def _sum_up(self) -> None:
+        self._sums.zero_()
+        self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
+
     def _prepare(self) -> None:
         """Compile the kernels and capture an interval, once."""
         if self._graph is None:
             names: list[str] = []
-            wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
             self._on_launch = names.append
-            with wp.ScopedCapture(device=self.device) as capture:
-                self._interval()
+            self._graph = self._captured(self._interval)
             self._on_launch = None
             self._kernels_of_a_step = tuple(names[1:])  # the first one starts the interval
-            self._graph = capture.graph
+
+    def _captured(self, launches: Callable[[], None]) -> Any:
+        """A graph of the launches, which replays for a hundredth of what they cost one by one."""
+        wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
+        with wp.ScopedCapture(device=self.device) as capture:
+            launches()
+        return capture.graph
 
     @property
     def launched_kernels(self) -> tuple[str, ...]:
@@ -226,10 +250,10 @@ class Simulation:
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
-        self._set_clock_entry(at.TARGET, until)
+        self._target.fill_(until)
         self._prepare()
         wp.capture_launch(self._graph)
-        if int(self._counters.numpy()[at.DIVERGED]):
+        if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
 
     def kernel_times(self, until: float) -> dict[str, float]:
@@ -238,7 +262,7 @@ class Simulation:
         Launches are prepared beforehand; what is left of their own cost, a few microseconds, is that of `forget`, which
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
-        self._set_clock_entry(at.TARGET, until)
+        self._target.fill_(until)
         self._commands = []
         self._start()
         self._step()
@@ -246,7 +270,7 @@ class Simulation:
         self._commands = None
         start.launch()
         spent = dict.fromkeys((name for name, _ in commands), 0.0)
-        while int(self._running.numpy()[0]):
+        while int(self._read("running")[0]):
             for name, command in commands:
                 begin = time.perf_counter()
                 command.launch()
@@ -300,11 +324,12 @@ class Simulation:
 
     # -- state -------------------------------------------------------------------------------------------------
 
-    def _clock_entry(self, entry: int) -> float:
-        return float(self._clock.numpy()[entry])
+    def _read(self, name: str) -> NDArray[Any]:
+        """Present numbers of the clock, the counters or the sums; on the CPU they go on changing with the run."""
+        return self._seen[name] if name in self._seen else self._clock_arrays[name].numpy()
 
-    def _set_clock_entry(self, entry: int, value: float) -> None:
-        self._clock[entry : entry + 1].fill_(float(value))
+    def _clock_entry(self, entry: int) -> float:
+        return float(self._read("clock")[entry])
 
     @property
     def time(self) -> float:
@@ -314,7 +339,7 @@ class Simulation:
     @property
     def steps(self) -> int:
         """Time steps so far."""
-        return int(self._counters.numpy()[at.STEPS])
+        return int(self._read("counters")[at.STEPS])
 
     @property
     def barrier_displacement(self) -> float:
@@ -336,7 +361,7 @@ class Simulation:
         """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
         if self.effects.barrier != "sliding":
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
-        self._set_clock_entry(at.EXTERNAL_FORCE, force)
+        self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1].fill_(float(force))
 
     def points(self) -> dict[str, NDArray[np.float64]]:
         """State of the N material points still in the domain, as float64 arrays in SI units.
@@ -346,10 +371,11 @@ class Simulation:
         `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N].
         """
         inside = self._point_arrays["inside"].numpy() > 0
+        rows = slice(None) if inside.all() else inside
         arrays = {
-            name: array.numpy()[inside].astype(np.float64)
-            for name, array in self._point_arrays.items()
-            if name != "inside"
+            name: self._point_arrays[name].numpy()[rows].astype(np.float64)
+            for name in STATE_OF_POINTS
+            if name in self._point_arrays
         }
         material = self.scenario.flow.material
         state = {
@@ -375,7 +401,7 @@ class Simulation:
         return state
 
     def _totals(self) -> Totals:
-        return Totals(self._clock.numpy().tolist(), self._reactions.numpy().tolist())
+        return Totals(self._read("clock").tolist(), self._read("reactions").tolist())
 
     def sample(self) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval).
@@ -385,9 +411,10 @@ class Simulation:
         Raises:
             SimulationDiverged: some quantity of a material point is not a finite number.
         """
-        self._sums.zero_()
-        self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
-        sums = self._sums.numpy().tolist()
+        if self._ledger_graph is None:
+            self._ledger_graph = self._captured(self._sum_up)
+        wp.capture_launch(self._ledger_graph)
+        sums = self._read("sums").tolist()
         if sums[at.LEDGER_NOT_FINITE] > 0.0:
             raise SimulationDiverged(self._what_diverged())
         totals = self._totals()
@@ -396,7 +423,7 @@ class Simulation:
             totals,
             self._last,
             sums=sums,
-            left=self._left.numpy().tolist(),
+            left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
         self._last = totals
@@ -405,7 +432,7 @@ class Simulation:
     @property
     def record(self) -> dict[str, Any]:
         """What ruled the run: counts of the limits on the time step, of barrier iterations, of points that left."""
-        counters, clock = self._counters.numpy(), self._clock.numpy()
+        counters, clock = self._read("counters"), self._read("clock")
         return {
             "steps": int(counters[at.STEPS]),
             "steps_limited_by_wave": int(counters[at.LIMIT_WAVE]),

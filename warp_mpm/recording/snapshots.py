@@ -22,6 +22,17 @@ from warp_mpm.recording.schedule import Schedule
 
 VTK_VERTEX = 1
 
+FILLED = (
+    "Points",
+    "Offsets",
+    "NumberOfPoints",
+    "FieldData/barrier_displacement",
+    "Steps/PointOffsets",
+    "Steps/CellOffsets",
+    "Steps/Values",
+)
+"""Data sets beside the point fields to which every snapshot adds."""
+
 
 class SnapshotRecorder:
     """Writes positions and point fields, in single precision.
@@ -48,6 +59,8 @@ class SnapshotRecorder:
         self._root: h5py.Group
         self._steps: h5py.Group
         self._fields: dict[str, h5py.Dataset] = {}
+        self._filled: dict[str, h5py.Dataset] = {}
+        self._buffers: dict[str, np.ndarray] = {}
         if mark is None:
             self._file = h5py.File(path, "x", libver=("earliest", "v108"), locking=False)
             self._root = self._file.create_group("VTKHDF")
@@ -69,13 +82,13 @@ class SnapshotRecorder:
             for dataset in (root["Points"], root["Types"], *self._fields.values()):
                 dataset.resize(room * number, axis=0)
             root["Offsets"].resize(room * (number + 1), axis=0)
-            for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
-                root[name].resize(room, axis=0)
+            root["NumberOfPoints"].resize(room, axis=0)
             root["FieldData/barrier_displacement"].resize(room, axis=0)
             steps.visititems(lambda _, item: item.resize(room, axis=0) if isinstance(item, h5py.Dataset) else None)
             self._set_constants()
             steps["Values"].resize(self._count, axis=0)
             steps.attrs.modify("NSteps", self._count)
+            self._filled = {name: root[name] for name in FILLED}
             file.flush()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             if self._file is not None:
@@ -118,31 +131,39 @@ class SnapshotRecorder:
         if self._count == 0:
             self._lay_out(len(position), {name: np.asarray(values) for name, values in points.items()})
         assert self._file is not None
-        number, begin = len(position), self._points
-        rows = slice(begin, begin + number)
-        self._root["Points"][rows, :2] = position
+        filled = self._filled
+        number, begin, step = len(position), self._points, self._count
+        _fill(filled["Points"], begin, self._as_vtk("position", position))
         for name, dataset in self._fields.items():
-            dataset[rows] = _as_vtk(np.asarray(points[name]))
+            _fill(dataset, begin, self._as_vtk(name, np.asarray(points[name])))
 
-        step = self._count
         # Readers look for a step's offsets after those of the steps before, each one longer than its cells.
-        self._root["Offsets"][begin + step : begin + step + number + 1] = np.arange(number + 1)
-        self._steps["CellOffsets"][step] = begin
-        self._steps["PointOffsets"][step] = begin
-        for offsets in self._steps["PointDataOffsets"].values():
-            offsets[step] = begin
-        for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
-            self._root[name][step] = number
+        _fill(filled["Offsets"], begin + step, np.arange(number + 1))
+        _fill(filled["NumberOfPoints"], step, np.array([number]))
+        _fill(filled["Steps/PointOffsets"], step, np.array([begin]))
+        _fill(filled["Steps/CellOffsets"], step, np.array([[begin]]))
         displacement = getattr(simulation, "barrier_displacement", None)
-        self._root["FieldData/barrier_displacement"][step] = np.nan if displacement is None else displacement
+        shift = np.nan if displacement is None else displacement
+        _fill(filled["FieldData/barrier_displacement"], step, np.array([shift]))
         self._file.flush()
         # The count goes last: until it is written, a reader does not look at the new snapshot. VTK wants as many times
         # as steps, so their data set alone grows, inside the room that is set aside for it.
         self._count, self._points = step + 1, begin + number
-        self._steps["Values"].resize(self._count, axis=0)
-        self._steps["Values"][step] = simulation.time
-        self._steps.attrs.modify("NSteps", self._count)
+        times = filled["Steps/Values"]
+        times.id.set_extent((self._count,))
+        _fill(times, step, np.array([simulation.time]))
+        h5py.h5a.open(self._steps.id, b"NSteps").write(np.array(self._count))
         self._file.flush()
+
+    def _as_vtk(self, name: str, values: np.ndarray) -> np.ndarray:
+        """Values in single precision with VTK's components, in a buffer that is used again for the next snapshot."""
+        shape = _vtk_shape(values)
+        if name not in self._buffers or len(self._buffers[name]) < len(values):
+            self._buffers[name] = np.zeros(shape, np.float32)
+        buffer = self._buffers[name][: len(values)]
+        filled = buffer[:, : values.shape[1]] if values.ndim == 2 else buffer
+        filled[...] = values
+        return buffer
 
     def close(self) -> None:
         """Give back the room that was not used and close the file."""
@@ -160,8 +181,7 @@ class SnapshotRecorder:
             for dataset in (self._root["Points"], self._root["Types"], *self._fields.values()):
                 dataset.resize(self._points, axis=0)
             self._root["Offsets"].resize(self._points + self._count, axis=0)
-            for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
-                self._root[name].resize(self._count, axis=0)
+            self._root["NumberOfPoints"].resize(self._count, axis=0)
             self._root["FieldData/barrier_displacement"].resize(self._count, axis=0)
             self._steps.visititems(
                 lambda _, item: item.resize(self._count, axis=0) if isinstance(item, h5py.Dataset) else None
@@ -174,8 +194,10 @@ class SnapshotRecorder:
         root.attrs["Version"] = np.array([2, 2])
         root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
         self._dataset(root, "Points", room * number, 3, np.float32, chunk=number)
-        for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
-            self._dataset(root, name, room, None, np.int64)
+        # As many cells as points, and all fields of a step begin at the same point: one data set under several names.
+        self._dataset(root, "NumberOfPoints", room, None, np.int64)
+        for name in ("NumberOfCells", "NumberOfConnectivityIds"):
+            root[name] = root["NumberOfPoints"]
         # Cell i is the vertex i in every step: the list of vertices is shared, the types are all the fill value.
         root.create_dataset("Connectivity", data=np.arange(number))
         self._dataset(root, "Offsets", room * (number + 1), None, np.int64, chunk=number + 1)
@@ -196,12 +218,12 @@ class SnapshotRecorder:
         point_data, point_offsets = root.create_group("PointData"), steps.create_group("PointDataOffsets")
         for name, values in fields.items():
             quantity = POINT_FIELDS[name]
-            components = _as_vtk(values[:1]).shape[1:]
+            _, *components = _vtk_shape(values)
             columns = components[0] if components else None
             dataset = self._dataset(point_data, name, room * number, columns, np.float32, chunk=number)
             dataset.attrs["unit"], dataset.attrs["meaning"] = quantity.unit, quantity.meaning
             self._fields[name] = dataset
-            self._dataset(point_offsets, name, room, None, np.int64)
+            point_offsets[name] = steps["PointOffsets"]
 
         field_data, field_offsets = root.create_group("FieldData"), steps.create_group("FieldDataOffsets")
         self._dataset(field_data, "barrier_displacement", room, None, np.float64)
@@ -209,6 +231,7 @@ class SnapshotRecorder:
         sizes = steps.create_group("FieldDataSizes")
         self._dataset(sizes, "barrier_displacement", room, 2, np.int64)
         self._set_constants()
+        self._filled = {name: root[name] for name in FILLED}
         assert self._file is not None
         self._file.flush()
 
@@ -246,9 +269,14 @@ def _failures_of_the_disk() -> Iterator[None]:
         raise OSError(reason or text.partition("\n")[0]) from None
 
 
-def _as_vtk(values: np.ndarray) -> np.ndarray:
-    """Values with VTK's components: vectors of three, symmetric tensors of six (xx, yy, zz, xy, yz, xz)."""
+def _vtk_shape(values: np.ndarray) -> tuple[int, ...]:
+    """Shape with VTK's components: vectors of three, symmetric tensors of six (xx, yy, zz, xy, yz, xz)."""
     width = {2: 3, 4: 6}.get(values.shape[1] if values.ndim == 2 else 0)
-    if width is None:
-        return values
-    return np.pad(values, ((0, 0), (0, width - values.shape[1])))
+    return values.shape if width is None else (len(values), width)
+
+
+def _fill(dataset: h5py.Dataset, begin: int, rows: np.ndarray) -> None:
+    """Write rows from `begin` on, by HDF5's own call: h5py's indexing takes longer than the writing."""
+    space = dataset.id.get_space()
+    space.select_hyperslab((begin, *(0 for _ in rows.shape[1:])), rows.shape)
+    dataset.id.write(h5py.h5s.create_simple(rows.shape), space, rows)
