@@ -383,7 +383,7 @@ class Simulation:
             "solid_velocity": arrays["velocity"][:, :2],
             "effective_stress": arrays["stress"],
             "deviatoric_strain": arrays["deviatoric_strain"],
-            "volume": arrays["volume"],
+            "volume": np.maximum(arrays["volume"], (1.0 - material.porosity) * arrays["reference_volume"]),
             "solid_mass": self._initial.solid_mass[inside],
             "liquid_mass": self._initial.liquid_mass[inside],
         }

@@ -34,7 +34,7 @@ def spoil(simulation, name, value, point=100):
         ("stress", np.nan, "the velocity"),  # the forces carry it to the velocities within the step
         ("stress", -np.inf, "the velocity"),
         ("liquid_strain", np.nan, "the pore pressure"),
-        ("volume", np.nan, "the velocity"),
+        ("volume", np.nan, "the volume"),
     ],
 )
 def test_noticed_within_one_interval(simulation, name, value, quantity):

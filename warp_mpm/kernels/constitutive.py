@@ -1,7 +1,6 @@
 """End of the step at the material points: strains, effective stress, pore pressure, position ("update stress last")."""
 
 from types import SimpleNamespace
-from typing import Any
 
 import warp as wp
 
@@ -17,16 +16,23 @@ from .layout import (
     OLD_BARRIER_VELOCITY,
     POINTS_LEFT,
     POINTS_PUSHED,
+    SPEED_MAX,
     TIME_STEP,
 )
 from .mohr_coulomb import make_return_mapping
 
 
-def make_trial_stress(types: SimpleNamespace) -> Any:
-    """Build the function `trial_stress`, the elastic part of the constitutive law."""
+def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
+    """Build the functions `trial_stress`, the elastic part of the constitutive law, and `volume_ratio`."""
     F = types.scalar
     V4 = types.V4
     Parameters = types.Parameters
+
+    @wp.func
+    def volume_ratio(strain: F):
+        """exp(strain), the ratio of the volumes, as a quotient that is positive for every strain."""
+        even = F(12.0) + strain * strain
+        return (even + F(6.0) * strain) / (even - F(6.0) * strain)
 
     @wp.func
     def trial_stress(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
@@ -53,9 +59,11 @@ def make_trial_stress(types: SimpleNamespace) -> Any:
         difference = half * (stress[0] - stress[1])
         turned_difference = difference * cosine - sine * stress[3]
         turned_shear = sine * difference + cosine * stress[3]
-        keep = F(1.0) - volume_strain
-        lame = parameters.lame * volume_strain
-        double = F(2.0) * parameters.shear_modulus
+        # The rate integrated over the step, as for the volume: a strain and its reverse leave nothing behind.
+        keep = F(1.0) / volume_ratio(volume_strain)
+        over_step = F(12.0) / (F(12.0) + F(6.0) * volume_strain + volume_strain * volume_strain)
+        lame = parameters.lame * volume_strain * over_step
+        double = F(2.0) * parameters.shear_modulus * over_step
         trial = V4(
             keep * (centre + turned_difference) + lame + double * xx,
             keep * (centre - turned_difference) + lame + double * yy,
@@ -65,7 +73,7 @@ def make_trial_stress(types: SimpleNamespace) -> Any:
         squares = (xx - third) * (xx - third) + (yy - third) * (yy - third) + third * third + F(2.0) * xy * xy
         return trial, wp.sqrt(F(2.0 / 3.0) * squares)
 
-    return trial_stress
+    return SimpleNamespace(trial_stress=trial_stress, volume_ratio=volume_ratio)
 
 
 def make_constitutive(
@@ -96,7 +104,9 @@ def make_constitutive(
     MOVING = effects.barrier in ("sliding", "driven")
     GAP_BOUND = effects.gap_record and effects.smoothing_grid
 
-    trial_stress = make_trial_stress(types)
+    elasticity = make_elasticity(types)
+    trial_stress = elasticity.trial_stress
+    volume_ratio = elasticity.volume_ratio
 
     @wp.func
     def room(filling: F) -> F:
@@ -172,7 +182,15 @@ def make_constitutive(
         stress, deviatoric = trial_stress(points.stress[p], gradient, borne, time_step, parameters)
         points.stress[p] = stress
         points.deviatoric_strain[p] += deviatoric
-        points.volume[p] = points.volume[p] * (F(1.0) + borne)
+        volume = points.volume[p] * volume_ratio(borne)
+        points.volume[p] = volume
+        grains = parameters.grain_share * points.reference_volume[p]
+        if volume < grains:
+            # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
+            v = points.velocity[p]
+            gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
+            speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
+            wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
 
         if LIQUID:
             # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
@@ -279,8 +297,9 @@ def make_constitutive(
             stress, opening = return_mapping(points.stress[p], parameters)
             points.stress[p] = stress
             if opening > F(0.0):
-                points.solid_gap[p] += opening
                 points.volume[p] = points.volume[p] * (F(1.0) - opening)
+                # As a strain, -ln(1 - opening), so that the reverse strain closes the gap.
+                points.solid_gap[p] += opening / (F(1.0) - F(0.5) * opening)
 
         kernels.plasticity = plasticity
 

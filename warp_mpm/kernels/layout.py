@@ -180,6 +180,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         "lame": scalar,
         "shear_modulus": scalar,
         "bulk_modulus": scalar,
+        "grain_share": scalar,  # volume of the grains over that of the whole, initially: 1 - n
         "wave_speed": wp.float64,
         "courant_number": wp.float64,
         "largest_stable_step": wp.float64,

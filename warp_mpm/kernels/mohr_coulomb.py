@@ -20,7 +20,8 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
     edges, one, two or three tension planes, cone and cut-off together with their two corners.
 
     The function takes the trial stress (xx, yy, zz, xy) [Pa] and `parameters`, whose fields `yield_constants` makes; it
-    returns the stress on or inside the surface and the opening, the plastic volume strain due to the cut-off alone [-].
+    returns the stress on or inside the surface and the opening, the plastic volume strain due to the cut-off alone,
+    over the volume after it [-].
     Where most points yield, branches cost more than arithmetic: the cone is free of them.
     """
     F = types.scalar

@@ -101,7 +101,8 @@ def make_transfer(
         dx = slopes(fx) * parameters.inverse_spacing
         dy = slopes(fy) * parameters.inverse_spacing
         reference = points.reference_volume[p]
-        volume = points.volume[p]
+        # Grains do not give way: once the voids are closed the same pressure acts on their volume, not on less.
+        volume = wp.max(points.volume[p], parameters.grain_share * reference)
         stress = points.stress[p]
         velocity = points.velocity[p] * reference
         time_step = F(clock[wp.static(TIME_STEP)])

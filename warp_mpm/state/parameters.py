@@ -68,6 +68,7 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
         "lame": lame,
         "shear_modulus": shear,
         "bulk_modulus": lame + 2.0 / 3.0 * shear,
+        "grain_share": 1.0 - material.porosity,
     }
     if effects.plasticity:
         values |= yield_constants(

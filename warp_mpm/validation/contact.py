@@ -183,7 +183,7 @@ def _collision(side: float, points_per_cell: int) -> tuple[dict[str, Array], flo
             velocity=(1.0, 0.0),
             gravity=0.0,
             stress="zero",
-            soil={"young_modulus_Pa": 1.0, "friction_angle_deg": 0.0},
+            soil={"young_modulus_Pa": 1e-9, "friction_angle_deg": 0.0},
             barrier={
                 "shape": {"kind": "wall"},
                 "friction": 0.0,

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.effects import Effects
-from warp_mpm.kernels.constitutive import make_trial_stress
+from warp_mpm.kernels.constitutive import make_elasticity
 from warp_mpm.kernels.layout import layout
 from warp_mpm.kernels.mohr_coulomb import make_return_mapping, yield_constants
 from warp_mpm.validation.case import Array
@@ -20,7 +20,7 @@ def _kernels() -> SimpleNamespace:
     types = layout(Effects(formulation="dry"))
     module = wp.get_module("warp_mpm.validation.elements")
     wp.set_module_options({"enable_backward": False}, module=module)
-    trial_stress = make_trial_stress(types)
+    trial_stress = make_elasticity(types).trial_stress
     return_mapping = make_return_mapping(types)
     V4, Parameters = types.V4, types.Parameters
 
