@@ -8,7 +8,7 @@ import pytest
 from warp_mpm.effect_rules import effect_rules
 from warp_mpm.performance.benchmark import SHORT, Table, _ladder
 from warp_mpm.performance.chart import effects_chart
-from warp_mpm.performance.probe import in_turns
+from warp_mpm.performance.probe import Stepper, in_turns
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.plotting import save
 from warp_mpm.simulation import Simulation
@@ -73,3 +73,13 @@ def test_tables_and_chart(tmp_path):
     ]  # fmt: skip
     save(effects_chart([("dry", 4.3, 80.0), ("liquid", 5.4, 100.0), ("cheaper", 5.2, 96.0)]), tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 5000
+
+
+def test_a_probe_stays_within_the_run(load_scene):
+    """Beyond its end a scene is another one: here the flow would have left the grid."""
+    scene = load_scene("case_1_dry", **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.1})
+    stepper = Stepper(scene)
+    for _ in range(3):
+        assert stepper.chunk(0.05) > 0.0
+        assert stepper.simulation.time <= 0.1
+    assert stepper.furthest == pytest.approx(0.1)

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.cli import app
-from warp_mpm.performance.plan import make_plan, predicted_steps, speeds, what_if
+from warp_mpm.performance.plan import Ahead, growth, make_plan, predicted_steps, run_ahead, what_if
 from warp_mpm.recording import SnapshotRecorder, TimeSeriesRecorder, record_until
 from warp_mpm.simulation import Simulation
 from warp_mpm.time_step import step_limits
@@ -44,17 +44,26 @@ def test_predictions_hold(scene, tmp_path):
 def test_steps_land_on_the_records(load_scene):
     """Where a record is due before the step that the limits allow has passed, the records rule."""
     scene = load_scene("case_1", **{"output.time_series_interval_s": 2e-4, "output.end_time_s": 0.1})
-    assert predicted_steps(scene, [(0.0, 10.0)]) == 500
+    assert predicted_steps(scene, [Ahead(0.0, 10.0, 1.0)]) == 500
     rare = load_scene("case_1", **{"output.time_series_interval_s": 0.1, "output.snapshot_interval_s": 0.1})
     step = 0.95 * 0.2 / (step_limits(rare).wave_speed + 10.0)
-    assert predicted_steps(rare, [(0.0, 10.0)]) == 60 * math.ceil(0.1 / step)
+    assert predicted_steps(rare, [Ahead(0.0, 10.0, 1.0)]) == 60 * math.ceil(0.1 / step)
 
 
 def test_the_twin_sees_the_jet(scene):
-    known = speeds(scene)
-    assert known[0] == (0.0, 10.0)
-    assert known[-1][0] == pytest.approx(1.5)
-    assert max(speed for _, speed in known) > 12.0  # squeezed out of the corner between face and flow
+    ahead = run_ahead(scene)
+    assert (ahead[0].begin, ahead[0].speed) == (pytest.approx(0.0, abs=1e-5), 10.0)
+    assert ahead[-1].begin == pytest.approx(1.5 * 199 / 200)
+    assert max(stretch.speed for stretch in ahead) > 12.0  # squeezed out of the corner between face and flow
+
+
+def test_dearer_steps_count(load_scene):
+    """Steps that cost twice as much from half time on: half as much again in the mean, twice after the first half."""
+    scene = load_scene("case_1", **{"output.end_time_s": 2.0})
+    ahead = [Ahead(0.0, 10.0, 1e-4), Ahead(0.5, 10.0, 1e-4), Ahead(1.0, 10.0, 2e-4)]
+    assert growth(scene, ahead, until=0.7) == pytest.approx(1.5, rel=0.01)
+    assert growth(scene, ahead[:1], until=0.7) == pytest.approx(1.0)
+    assert growth(scene, ahead, until=2.0) == pytest.approx(1.5 / (4 / 3), rel=0.01)
 
 
 def test_what_if_switches_one_effect_at_a_time(load_scene, monkeypatch):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from warp_mpm.effect_rules import Rule, effect_rules
 from warp_mpm.performance.probe import Stepper, clock_of, in_turns
-from warp_mpm.recording import SnapshotRecorder, TimeSeriesRecorder
+from warp_mpm.recording import Recorder, SnapshotRecorder, TimeSeriesRecorder
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.time_step import step_limits
@@ -24,7 +24,22 @@ TWIN_POINTS = 700
 """Material points of the coarse twin that is run ahead to see how fast the flow gets."""
 
 TWIN_SECONDS = 2.0
-"""Wall time after which the twin is stopped; its last speed then holds for the rest."""
+"""Time after which the twin is stopped; its last speed and cost then hold for the rest."""
+
+TWIN_STRETCHES = 200
+"""Stretches of the twin's run."""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """What the coarse twin saw in one stretch of its run."""
+
+    begin: float
+    """Simulated time [s] at which it began."""
+    speed: float
+    """Greatest speed of the flow [m/s] at its begin."""
+    step_cost: float
+    """Cost of one of its steps [s]; it grows as the flow spreads over more of the grid and loses its order."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +63,7 @@ class Plan:
     steps: int
     """Predicted number of time steps."""
     step_cost: float
-    """Measured [ns] per point and step."""
+    """[ns] per point and step, mean over the run: measured, times what it grows as the flow spreads."""
     recording_time: float
     """Predicted wall time of all records [s]."""
 
@@ -95,9 +110,11 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
     """
     interval = min(scenario.output.time_series_interval_s, scenario.output.snapshot_interval_s)
     stepper = Stepper(scenario, device=device, clock=clock, interval=interval)
+    blocks = stepper.simulation.blocks_in_use
+    (begun,) = in_turns([stepper], rounds=5, seconds=PROBE_SECONDS / 5.0)
     simulation = stepper.simulation
-    blocks = simulation.blocks_in_use
-    (step_cost,) = in_turns([stepper], rounds=5, seconds=PROBE_SECONDS / 5.0)
+    ahead = run_ahead(scenario, device=device)
+    step_cost = begun * growth(scenario, ahead, stepper.furthest)
     return Plan(
         rules=effect_rules(scenario),
         kernels=_kernel_costs(simulation, step_cost),
@@ -107,7 +124,7 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
         blocks_in_use=blocks,
         wave_step=scenario.numerics.spacing_m / (step_limits(scenario).wave_speed + scenario.flow.speed),
         drag_step=step_limits(scenario).drag_step,
-        steps=predicted_steps(scenario, speeds(scenario, device=device)),
+        steps=predicted_steps(scenario, ahead),
         step_cost=step_cost,
         recording_time=_recording_time(scenario, simulation, clock),
     )
@@ -121,7 +138,7 @@ def what_if(
     Args:
         on_progress: called with the name of each effect before it is compiled.
     """
-    known = speeds(scenario, device=device)
+    ahead = run_ahead(scenario, device=device)
     scenes, names, changes = [scenario], ["as it is"], [""]
     for rule in effect_rules(scenario):
         if rule.switched:
@@ -138,7 +155,7 @@ def what_if(
     costs = in_turns(steppers, rounds=7, seconds=0.08)
     switches = []
     for name, change, scene, stepper, cost in zip(names, changes, scenes, steppers, costs, strict=True):
-        steps = predicted_steps(scene, known)
+        steps = predicted_steps(scene, ahead)
         seconds = 1e-9 * cost * stepper.simulation.material_points * steps
         switches.append(Switch(name, change, cost, steps, seconds))
     return switches
@@ -149,43 +166,57 @@ def described(value: str | bool) -> str:
     return {True: "on", False: "off"}.get(value, str(value)) if isinstance(value, bool) else value.replace("_", "-")
 
 
-def speeds(scenario: Scenario, *, device: str = "cpu") -> list[tuple[float, float]]:
-    """Times [s] and the greatest speed of the flow until then [m/s], from a coarse twin of the scene run ahead."""
+def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:
+    """How fast the flow gets and how much dearer its steps become, from a coarse twin of the scene."""
     flow, numerics, end_time = scenario.flow, scenario.numerics, scenario.output.end_time_s
     coarse = math.sqrt(flow.volume * numerics.points_per_cell / TWIN_POINTS)
     changes = {"numerics.spacing_m": max(coarse, numerics.spacing_m), "numerics.drag": "semi_implicit"}
-    twin = Simulation(scenario.replaced(changes), device=device)
+    twin, clock = Simulation(scenario.replaced(changes), device=device), clock_of(device)
     twin.advance(1e-6 * end_time)
-    known = [(0.0, flow.speed)]
-    begin = time.perf_counter()
-    for count in range(1, 201):
-        if time.perf_counter() - begin > TWIN_SECONDS:
+    ahead: list[Ahead] = []
+    begin, speed = clock(), flow.speed
+    for count in range(1, TWIN_STRETCHES + 1):
+        if clock() - begin > TWIN_SECONDS:
             break
-        twin.advance(end_time * count / 200.0)
-        known.append((twin.time, twin.sample()["speed_max"]))
-    return known
+        time, steps, now = twin.time, twin.steps, clock()
+        twin.advance(end_time * count / TWIN_STRETCHES)
+        ahead.append(Ahead(time, speed, (clock() - now) / (twin.steps - steps)))
+        speed = twin.sample()["speed_max"]
+    return ahead
 
 
-def predicted_steps(scenario: Scenario, known: list[tuple[float, float]]) -> int:
+def predicted_steps(scenario: Scenario, ahead: list[Ahead]) -> int:
     """Number of steps, as the simulation chooses them: within the limits, and landing on every record.
 
     Args:
         scenario: the scene.
-        known: times and greatest speeds, from `speeds`.
+        ahead: of its twin, from `run_ahead`.
     """
+    return math.ceil(sum(steps for steps, _ in _steps(scenario, ahead)))
+
+
+def growth(scenario: Scenario, ahead: list[Ahead], until: float) -> float:
+    """Mean cost of the run's steps over that of its steps until a time [s], as the twin's steps became dearer [-]."""
+    known = [stretch.step_cost for stretch in ahead if stretch.begin < until] or [ahead[0].step_cost]
+    steps = _steps(scenario, ahead)
+    mean = sum(number * stretch.step_cost for number, stretch in steps) / sum(number for number, _ in steps)
+    return mean / statistics.mean(known)
+
+
+def _steps(scenario: Scenario, ahead: list[Ahead]) -> list[tuple[float, Ahead]]:
+    """Numbers of steps, and what the twin saw at their time; at most some thousand stretches of the run."""
     limits, numerics, output = step_limits(scenario), scenario.numerics, scenario.output
     interval = min(output.time_series_interval_s, output.snapshot_interval_s, output.end_time_s)
-    total, place = 0.0, 0
+    found, place = [], 0
     intervals = output.end_time_s / interval
-    # Steps are counted over at most some thousand stretches, each of one or more intervals.
     stretch = max(1, math.ceil(intervals / 5000.0))
     for number in range(0, math.ceil(intervals - 1e-9), stretch):
-        while place + 1 < len(known) and known[place + 1][0] <= number * interval:
+        while place + 1 < len(ahead) and ahead[place + 1].begin <= number * interval:
             place += 1
-        wave = numerics.spacing_m / (limits.wave_speed + known[place][1])
+        wave = numerics.spacing_m / (limits.wave_speed + ahead[place].speed)
         largest = numerics.courant_number * min(wave, limits.drag_step)
-        total += math.ceil(interval / largest - 1e-9) * min(stretch, intervals - number)
-    return math.ceil(total)
+        found.append((math.ceil(interval / largest - 1e-9) * min(stretch, intervals - number), ahead[place]))
+    return found
 
 
 def _kernel_costs(simulation: Simulation, step_cost: float) -> dict[str, float]:
@@ -199,19 +230,21 @@ def _kernel_costs(simulation: Simulation, step_cost: float) -> dict[str, float]:
 
 
 def _recording_time(scenario: Scenario, simulation: Simulation, clock: Callable[[], float]) -> float:
-    """Time [s] of all samples and snapshots of a run, from a few of each."""
-    output = scenario.output
+    """Time [s] of all samples and snapshots of a run, from the first and a few more of each."""
+    output, whole = scenario.output, 0.0
     with tempfile.TemporaryDirectory() as folder:
+        begin = clock()
         series = TimeSeriesRecorder(Path(folder) / "series.csv", output.time_series_interval_s)
         snapshots = SnapshotRecorder(Path(folder) / "snapshots.vtkhdf", output.snapshot_interval_s, output.end_time_s)
-        each = []
-        for recorder in (series, snapshots):
+        recorders: list[Recorder] = [series, snapshots]
+        for recorder in recorders:
+            recorder.record(simulation)
             spent = []
-            for _ in range(6):
-                begin = clock()
+            for _ in range(5):
+                now = clock()
                 recorder.record(simulation)
-                spent.append(clock() - begin)
-            each.append(statistics.median(spent[1:]))
+                spent.append(clock() - now)
             recorder.close()
-    samples = output.end_time_s / output.time_series_interval_s
-    return samples * each[0] + output.end_time_s / output.snapshot_interval_s * each[1]
+            begin += sum(spent)
+            whole += output.end_time_s / recorder.schedule.interval * statistics.median(spent)
+        return whole + clock() - begin

@@ -26,7 +26,7 @@ class Measured(Protocol):
 
 
 class Stepper:
-    """A simulation, begun and compiled, that is stepped on to see what a step costs."""
+    """A simulation, begun and compiled, that is stepped on to see what a step costs; at its end it begins anew."""
 
     def __init__(
         self,
@@ -39,23 +39,33 @@ class Stepper:
         """Args: scenario; device: a Warp device; clock: tells time [s]; interval: between two records [s], at which a
         run comes back to Python, as it does here."""
         self._clock, self._interval = clock, interval
-        self.simulation = Simulation(scenario, device=device)
+        self._scenario, self._device, self._end = scenario, device, scenario.output.end_time_s
+        self.simulation = self._begun()
         self._points = self.simulation.material_points
-        self.simulation.advance(1e-6 * scenario.output.time_series_interval_s)
+        self.furthest = 0.0
+        """Greatest simulated time that was reached [s]."""
         limits, numerics = step_limits(scenario), scenario.numerics
         wave = numerics.spacing_m / (limits.wave_speed + scenario.flow.speed)
         self._step = numerics.courant_number * min(wave, limits.drag_step)
         self._per_step = self._cost(2)[0] / 2.0
 
+    def _begun(self) -> Simulation:
+        simulation = Simulation(self._scenario, device=self._device)
+        simulation.advance(1e-6 * min(self._scenario.output.time_series_interval_s, self._end))
+        return simulation
+
     def _cost(self, steps: int) -> tuple[float, int]:
         """Time [s] of about that many steps, and their number."""
+        if self.simulation.time + steps * self._step > self._end:
+            self.simulation = self._begun()
         simulation, before = self.simulation, self.simulation.steps
-        now, end = simulation.time, simulation.time + steps * self._step
+        now, end = simulation.time, min(simulation.time + steps * self._step, self._end)
         begin = self._clock()
         while now < end:
             now = min(now + self._interval, end)
             simulation.advance(now)
         spent = self._clock() - begin
+        self.furthest = max(self.furthest, end)
         return spent, simulation.steps - before
 
     def chunk(self, seconds: float) -> float:

@@ -190,7 +190,7 @@ class SnapshotRecorder:
     def _lay_out(self, number: int, fields: dict[str, np.ndarray]) -> None:
         """Create every group, attribute and data set; `number` is the most points that any snapshot will have."""
         check_known(set(fields), POINT_FIELDS)
-        root, room = self._root, self._room
+        root, room, number = self._root, self._room, max(number, 1)
         root.attrs["Version"] = np.array([2, 2])
         root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
         self._dataset(root, "Points", room * number, 3, np.float32, chunk=number)
