@@ -137,6 +137,10 @@ def contact_nodes(barrier: Barrier, grid: GridLayout, depth_in_cells: float = 4.
     its place. Any other plane acts on the nodes inside it and within half a cell outside: the splines then vanish
     between half a cell outside and half a cell inside, without bias. A node belongs to the plane nearest to it; those
     deeper than `depth_in_cells` are out of the flow's reach and left out.
+
+    A node outside an inclined face or back acts only at a cell or more below the crest: nearer, its splines reach over
+    the crest and would hold up what flows over. The sliding distance would then hang, by a tenth, on where the crest's
+    corner happens to lie among the nodes.
     """
     spacing = grid.spacing
     x, y = grid.node_positions()
@@ -153,6 +157,13 @@ def contact_nodes(barrier: Barrier, grid: GridLayout, depth_in_cells: float = 4.
     nearest = stacked.argmax(axis=0)
     outermost = stacked.max(axis=0)
     touching = (outermost < 0.0) & (outermost > -depth_in_cells) & (y[None, :] > -3.0 * spacing)
+    if isinstance(barrier.shape, Trapezoid):
+        crest = barrier.shape.base_crest_height[2]
+        inclined = np.array(
+            [not level and surface != TOP for level, (surface, _, _) in zip(aligned, planes, strict=True)]
+        )
+        outside = inclined[nearest] & (outermost > -0.5)
+        touching &= ~(outside & (y[None, :] > crest - spacing * (1.0 - 1e-9)))
     node = np.argwhere(touching).astype(np.int32)
     plane = nearest[touching]
     deep = outermost[touching]

@@ -131,3 +131,17 @@ def test_the_shipped_scenes_keep_both_phases_apart_from_the_barrier(load_scene):
     back = (height * (position[:, 0] - base) + run * position[:, 1]) / length
     depth = np.maximum(np.maximum(face, back), position[:, 1] - height)
     assert depth.min() > -0.25
+
+
+def test_sliding_does_not_hang_on_where_the_crest_lies_among_the_nodes(load_scene):
+    """Spacings that differ little, of which one has a node just outside the face in the row below the crest.
+
+    It would hold up what flows over, and the barrier would slide 9 % farther; without it they differ by 1.6 %, the
+    scatter of such coarse grids.
+    """
+    slid = []
+    for rows in (15, 16):  # in the barrier's height of 6 m
+        simulation = Simulation(scene(load_scene, **{"numerics.spacing_m": 6.0 / rows, "output.end_time_s": 6.0}))
+        simulation.advance(6.0)
+        slid.append(simulation.barrier_displacement)
+    assert slid[1] == pytest.approx(slid[0], rel=0.03)
