@@ -431,7 +431,8 @@ class Simulation:
 
     @property
     def record(self) -> dict[str, Any]:
-        """What ruled the run: counts of the limits on the time step, of barrier iterations, of points that left."""
+        """What ruled the run: counts of the limits on the time step, of barrier iterations, of points that left, and of
+        the points on which a limiter acted, once per step and point."""
         counters, clock = self._read("counters"), self._read("clock")
         return {
             "steps": int(counters[at.STEPS]),
@@ -444,6 +445,8 @@ class Simulation:
             "barrier_unconverged": int(counters[at.BARRIER_UNCONVERGED]),
             "points_left": int(counters[at.POINTS_LEFT]),
             "points_pushed_out": int(counters[at.POINTS_PUSHED]),
+            "gaps_bounded": int(clock[at.GAPS_BOUNDED]),
+            "voids_closed": int(clock[at.VOIDS_CLOSED]),
         }
 
     def _state_arrays(self) -> dict[str, Any]:

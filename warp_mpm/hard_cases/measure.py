@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.grid import barrier_planes
-from warp_mpm.hard_cases.criteria import CRITERIA, Criterion, speed_bound
+from warp_mpm.hard_cases.bounds import pressure_bound, speed_bound, voids_close
+from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
 from warp_mpm.recording import Schedule
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario
 from warp_mpm.simulation import Simulation, SimulationDiverged
 from warp_mpm.summary import energy_error, impact_figures, momentum_error
-from warp_mpm.time_step import step_limits
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,9 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
     output, end_time = scenario.output, scenario.output.end_time_s
     samples: list[dict[str, float]] = []
     noise: list[float] = []
-    extremes = {"penetration": 0.0, "porosity_low": -1.0, "porosity_high": 0.0, "yield_excess": 0.0}
+    extremes = dict.fromkeys(("penetration", "porosity_high", "yield_excess", "stress_max"), 0.0) | {
+        "porosity_low": -1.0
+    }
     measured = Measured({"diverged": 0.0})
     series, snapshots = Schedule(output.time_series_interval_s), Schedule(output.snapshot_interval_s)
     try:
@@ -90,17 +92,25 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
             simulation.advance(min(end_time, series.next_time, snapshots.next_time))
     except SimulationDiverged as error:
         measured.figures["diverged"], measured.problem = 1.0, str(error)
+    record, points, steps = simulation.record, simulation.material_points, max(simulation.steps, 1)
     columns = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
     measured.figures |= (
         extremes
         | _of_the_series(scenario, columns)
         | {
-            "points": float(simulation.material_points),
-            "steps": float(simulation.steps),
-            "left_share": simulation.record["points_left"] / simulation.material_points,
+            "points": float(points),
+            "steps": float(steps),
+            "left_share": record["points_left"] / points,
+            "pushed_share": record["points_pushed_out"] / (points * steps),
+            "gaps_bounded_share": record["gaps_bounded"] / (points * steps),
+            "voids_closed_share": record["voids_closed"] / (points * steps),
+            "unconverged_share": record["barrier_unconverged"] / steps,
             "wall_time": time.perf_counter() - started,
         }
     )
+    measured.figures["yield_excess"] /= max(measured.figures["stress_max"], 1.0)
+    if voids_close(scenario):
+        del measured.figures["voids_closed_share"]  # as they must, by the theory of shocks
     if noise:
         measured.figures["pressure_noise"] = float(np.median(noise))
     return measured
@@ -135,11 +145,11 @@ def _of_the_series(scenario: Scenario, columns: dict[str, Array]) -> dict[str, f
     fastest, bound = float(columns["speed_max"].max()), speed_bound(scenario)
     figures |= {"speed_max": fastest, "speed_ratio": fastest / bound if bound > 0.0 else fastest}
     if "pore_pressure_max_anywhere" in columns:
-        material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
-        still = material.density * scenario.gravity.acceleration_m_per_s2 * depth
-        hammer = material.density * (step_limits(scenario).sound_speed + fastest) * fastest
         greatest = float(columns["pore_pressure_max_anywhere"].max())
-        figures |= {"pore_pressure_max": greatest, "pressure_ratio": greatest / max(hammer + still, 1.0)}
+        figures |= {
+            "pore_pressure_max": greatest,
+            "pressure_ratio": greatest / max(pressure_bound(scenario, fastest), 1.0),
+        }
     impact = impact_figures(columns["time"], columns.get("impact_force_x"))
     if impact["peak_force_filtered"] is not None:
         figures["peak_force_filtered"] = impact["peak_force_filtered"]
@@ -155,8 +165,9 @@ def _widen(extremes: dict[str, float], scenario: Scenario, snapshot: Snapshot) -
         "penetration": _penetration(scenario, snapshot),
         "porosity_low": -float(porosity.min()),
         "porosity_high": float(porosity.max()),
-        "yield_excess": _yield_excess(scenario, snapshot["effective_stress"]),
     }
+    if scenario.flow.material.plasticity:
+        found["yield_excess"], found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
     for name, value in found.items():
         extremes[name] = float(np.maximum(extremes[name], value))  # which keeps NaN
 
@@ -182,10 +193,9 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
     return float(depth.max() / scenario.numerics.spacing_m)
 
 
-def _yield_excess(scenario: Scenario, stress: Array) -> float:
+def _yield_excess(scenario: Scenario, stress: Array) -> tuple[float, float]:
+    """Greatest distance outside the yield surface and greatest principal stress [Pa]."""
     material = scenario.flow.material
-    if not material.plasticity:
-        return 0.0
     xx, yy, zz, xy = stress.T
     mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
@@ -197,7 +207,7 @@ def _yield_excess(scenario: Scenario, stress: Array) -> float:
     cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
     apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
     excess = np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
-    return float(max(excess.max(), 0.0) / max(np.abs(principal).max(), material.cohesion_Pa, 1.0))
+    return float(np.maximum(excess.max(), 0.0)), float(max(np.abs(principal).max(), material.cohesion_Pa))
 
 
 def _pressure_noise(scenario: Scenario, snapshot: Snapshot) -> list[float]:

@@ -7,6 +7,7 @@ import warp as wp
 from .layout import (
     BARRIER_VELOCITY,
     DIVERGED,
+    GAPS_BOUNDED,
     GRID_SHIFT,
     LEFT_ENERGY,
     LEFT_LIQUID_MASS,
@@ -18,6 +19,7 @@ from .layout import (
     POINTS_PUSHED,
     SPEED_MAX,
     TIME_STEP,
+    VOIDS_CLOSED,
 )
 from .mohr_coulomb import make_return_mapping
 
@@ -175,7 +177,10 @@ def make_constitutive(
             gap = points.solid_gap[p]
             if gap > F(0.0):
                 if GAP_BOUND:
-                    gap = wp.min(gap, room(filling))
+                    largest = room(filling)
+                    if gap > largest:
+                        gap = largest
+                        wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
                 closed = wp.min(gap, wp.max(-borne, F(0.0)))
                 borne += closed
                 points.solid_gap[p] = gap - closed
@@ -191,6 +196,7 @@ def make_constitutive(
             gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
             speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
             wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
+            wp.atomic_add(clock, wp.static(VOIDS_CLOSED), wp.float64(1.0))
 
         if LIQUID:
             # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
@@ -217,8 +223,10 @@ def make_constitutive(
                         strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
                     )
             if GAP_BOUND:
-                if strain > F(0.0):
-                    strain = wp.min(strain, room(filling) / parameters.porosity)
+                largest_strain = room(filling) / parameters.porosity
+                if strain > largest_strain:
+                    strain = largest_strain
+                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
             points.liquid_strain[p] = strain
 
         before = x

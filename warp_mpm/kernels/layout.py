@@ -46,7 +46,11 @@ OLD_BARRIER_VELOCITY = 19
 BARRIER_IMPULSE_X = 20
 INITIAL_MASS_SOLID = 21
 INITIAL_MASS_LIQUID = 22
-CLOCK_SIZE = 23
+GAPS_BOUNDED = 23
+"""Times that the gap of a point was cut to the room that its neighbours leave."""
+VOIDS_CLOSED = 24
+"""Times that a point went into a step with the volume of its grains and no voids."""
+CLOCK_SIZE = 25
 
 FASTEST = 1.0e5
 """Speed [m/s] beyond which a run has diverged, whatever the scene."""

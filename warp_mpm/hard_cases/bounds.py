@@ -1,0 +1,106 @@
+"""Greatest speeds and pressures that energy and wave theory allow in a scene, with their derivations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm.grid import barrier_planes
+from warp_mpm.scenario import Prescribed, Scenario
+from warp_mpm.time_step import step_limits
+
+
+def impact_speed(scenario: Scenario) -> float:
+    """Greatest speed [m/s] at which material can meet a surface, by energy alone: u = sqrt(v0² + 2 g H) + v_b.
+
+    H is the height that it can fall, with what it covers downhill on a slope; v_b the speed of a driven barrier.
+    """
+    outline = scenario.flow.polygon
+    gx, gy = scenario.gravity.vector
+    lowest = 0.0 if scenario.ground is not None else scenario.domain.bottom_m
+    height = outline[:, 1].max() - (lowest if lowest is not None else outline[:, 1].min())
+    time = scenario.output.end_time_s
+    downhill = abs(gx) * (scenario.flow.speed * time + 0.5 * abs(gx) * time**2)
+    speed = math.sqrt(scenario.flow.speed**2 + 2.0 * (abs(gy) * height + downhill))
+    if scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed):
+        speed += max(abs(velocity) for velocity in scenario.barrier.motion.velocities_m_per_s)
+    return speed
+
+
+def shock_speed(scenario: Scenario, speed: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Speed U [m/s] of the shock that stops material of `speed` u [m/s], relative to the material in front of it.
+
+    Rankine-Hugoniot: mass rho0 U = rho (U - u), momentum p = rho0 U u. With p = rho0 c² (rho / rho0 - 1), the law of
+    the skeleton (that of the liquid, with the logarithm of the density, is softer), U (U - u) = c², so that
+    U = u / 2 + sqrt(u² / 4 + c²). Where that would take more than the voids, rho / rho0 = U / (U - u) stops at
+    1 / (1 - n), where U = u / n.
+    """
+    sound, porosity = step_limits(scenario).sound_speed, scenario.flow.material.porosity
+    return np.maximum(0.5 * speed + np.sqrt(0.25 * speed**2 + sound**2), speed / porosity)
+
+
+def pressure_bound(scenario: Scenario, speed: float) -> float:
+    """Greatest pore pressure [Pa] where the fastest point has `speed` v [m/s]: rho U(v) v, the pressure behind the
+    shock that stops it (water hammer at low speed, stagnation at high), and rho g h at rest beneath."""
+    material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
+    at_rest = material.density * scenario.gravity.acceleration_m_per_s2 * depth
+    return float(material.density * shock_speed(scenario, speed) * speed + at_rest)
+
+
+def voids_close(scenario: Scenario) -> bool:
+    """Whether the impact or the weight presses the voids shut: p = rho U u + rho g h reaches the pressure at which
+    they are, rho c² n / (1 - n) by the law of the skeleton and -rho c² ln(1 - n) by that of the liquid."""
+    material, speed = scenario.flow.material, impact_speed(scenario)
+    sound, n = step_limits(scenario).sound_speed, material.porosity
+    at_rest = scenario.gravity.acceleration_m_per_s2 * float(np.ptp(scenario.flow.polygon[:, 1]))
+    shock = 0.5 * speed + math.hypot(0.5 * speed, sound)
+    closing = sound**2 * (n / (1.0 - n) if scenario.flow.formulation == "dry" else -math.log1p(-n))
+    return shock * speed + at_rest >= closing
+
+
+def closing_angle(scenario: Scenario) -> float:
+    """Least angle [rad] between a side of the flow at t = 0 and a surface that it is about to meet; pi / 2 at most."""
+    outline = scenario.flow.polygon
+    area = 0.5 * np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1])
+    begin, end = (outline, np.roll(outline, -1, axis=0)) if area > 0.0 else (np.roll(outline, -1, axis=0), outline)
+    along = (end - begin) / np.linalg.norm(end - begin, axis=1)[:, None]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    surfaces = []
+    if scenario.ground is not None:
+        surfaces.append(((0.0, 1.0), 0.0))
+    if scenario.barrier is not None:
+        surfaces += [(normal, offset) for _, normal, offset in barrier_planes(scenario.barrier)]
+    domain = scenario.domain
+    if domain.left_edge == "wall" and domain.left_m is not None:
+        surfaces.append(((1.0, 0.0), domain.left_m))
+    if domain.right_edge == "wall" and domain.right_m is not None:
+        surfaces.append(((-1.0, 0.0), -domain.right_m))
+    least = 0.5 * math.pi
+    for normal, offset in surfaces:
+        facing = outward @ normal < -1e-9
+        apart = np.maximum(begin @ normal, end @ normal) - offset > 1e-9
+        if (facing & apart).any():
+            cosine = -(outward @ normal)[facing & apart].min()
+            least = min(least, math.acos(min(cosine, 1.0)))
+    return least
+
+
+def speed_bound(scenario: Scenario) -> float:
+    """Greatest speed [m/s] of a material point: that of the jet where the flow closes on a surface.
+
+    A flow of speed u meets a surface at some angle, with u_n across and u_t along it. Its side and the surface enclose
+    the angle theta and close at a point that runs along the surface at u_n / tan(theta), faster by at most pi / 2 as
+    the liquid piles up before it (Wagner 1932): w = (pi / 2) u_n / tan(theta). Beyond the speed U of the shock there is
+    no jet, as no news of the free surface reaches the point (Lesser 1981): w <= U. Seen from that point the flow comes
+    at sqrt(w² + u_n²) with a pressure of at most that of the shock, rho U u_n, and leaves along the surface without:
+    by Bernoulli at sqrt(w² + u_n² + 2 U u_n); seen from the surface faster by w + u_t. Of all angles, the worst. What
+    later breaks over the flow may close at smaller angles still; the bound takes those of the scene as given.
+    """
+    angle = np.linspace(0.0, 0.5 * math.pi, 181)
+    speed, theta = impact_speed(scenario), closing_angle(scenario)
+    across, along = speed * np.cos(angle), speed * np.sin(angle)
+    shock = shock_speed(scenario, across)
+    running = shock if theta == 0.0 else np.minimum(shock, 0.5 * math.pi * across / math.tan(theta))
+    return float(np.max(along + running + np.sqrt(running**2 + across**2 + 2.0 * shock * across)))
