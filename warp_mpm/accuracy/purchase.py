@@ -18,7 +18,7 @@ from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder, scene_key
 from warp_mpm.results import Results
-from warp_mpm.scenario import Scenario
+from warp_mpm.scenario import Scenario, Trapezoid
 from warp_mpm.summary import cumulative_impulse
 
 DATA = "paper_scenes.json"
@@ -28,10 +28,16 @@ PROBE_CELLS = (6.0, 8.0, 11.0, 15.0)
 """Spacings of a probe: cells in the flow's depth. The finest costs a few per cent of a run of 40 cells."""
 
 FINEST_CELLS = 120.0
-"""Most cells in the flow's depth that are sold: the law of the error was measured far coarser."""
+"""Most cells in the flow's depth that are sold: errors were measured far coarser."""
 
 SAFETY = 1.25
-"""Factor on the extrapolated error."""
+"""Factor on an error that follows a law (Roache's grid convergence index)."""
+
+CLEAR = 0.25
+"""A ladder follows a law where its scatter about it is less than this share of what varies."""
+
+TIMED = 0.5
+"""Least time of a shipped rung [s] that is worth running to learn how fast a machine is."""
 
 OVERHEAD = 1.5
 """Time of a process and its files [s] beside the stepping: imports, compiled kernels, figures."""
@@ -64,7 +70,7 @@ class Offer:
     errors: dict[str, float]
     """Expected relative errors of the key quantities."""
     values: dict[str, float]
-    """Extrapolated values of the key quantities, SI."""
+    """Values of the key quantities on the finest grids, SI: extrapolated, or of the finest run."""
     source: str
     """What it rests on."""
 
@@ -77,7 +83,7 @@ class Offer:
         """In words."""
         parts = ", ".join(f"{QUANTITIES[name].label} {error:.1%}" for name, error in self.errors.items())
         return (
-            f"Chosen: spacing {self.spacing:g} m ({self.source}). Expected: {self.time:.3g} s on a free core, errors "
+            f"Chosen: spacing {self.spacing:.4g} m ({self.source}). Expected: {self.time:.3g} s on a free core, errors "
             f"of at most {self.error:.1%} ({parts})."
         )
 
@@ -88,9 +94,7 @@ class Offer:
             run: the folder of the run, which has ended.
             cpu_time: what it took of the processor [s]; on a free core that is the wall time.
         """
-        results = Results.open(run)
-        series, figures = results.time_series, dict(results.summary)
-        figures["peak_force"] = peak_mean(series["time"], series["impact_force_x"], SERIES_INTERVAL)
+        figures = figures_of(run)
         parts = ", ".join(
             f"{QUANTITIES[name].label} {abs(figures[name] - value) / abs(value):.1%}"
             for name, value in self.values.items()
@@ -98,8 +102,16 @@ class Offer:
         )
         return (
             f"Got: {cpu_time:.3g} s of the processor, {cpu_time / self.time:.2g} times what was expected "
-            f"({figures['wall_time']:.3g} s by the clock); away from the extrapolated values: {parts}."
+            f"({figures['wall_time']:.3g} s by the clock); away from the values expected on the finest grids: {parts}."
         )
+
+
+def figures_of(run: Path) -> dict[str, Any]:
+    """Figures of a run's folder, the peak force as a study has it."""
+    results = Results.open(run)
+    series = results.time_series
+    peak = peak_mean(series["time"], series["impact_force_x"], SERIES_INTERVAL)
+    return dict(results.summary) | {"peak_force": peak}
 
 
 def peak_mean(time: Array, force: Array, interval: float) -> float:
@@ -168,23 +180,23 @@ def buy(
     default = type(scenario.numerics)()
     own = scenario.numerics.model_copy(update={"spacing_m": default.spacing_m})
     if shipped is not None and own == default:
-        coarsest = max(shipped, key=lambda rung: rung.spacing)
-        on_probe(f"This scene was measured before; a run at {coarsest.spacing:g} m tells how fast this machine is.")
-        here = _rung(scenario, coarsest.spacing, measure)
-        rungs, speed = shipped, here.time / coarsest.time
+        timed = max(rung.spacing for rung in shipped if rung.time > TIMED or rung is shipped[-1])
+        on_probe(f"This scene was measured before; a run at {timed:g} m tells how fast this machine is.")
+        there = next(rung for rung in shipped if rung.spacing == timed)
+        rungs, speed = shipped, _rung(scenario, timed, measure).time / there.time
         source = "from shipped measurements of this scene"
     else:
-        depth = scenario.flow.depth
-        spacings = [float(f"{depth / cells:.3g}") for cells in PROBE_CELLS]
-        on_probe(f"Probing this scene at spacings of {', '.join(f'{spacing:g}' for spacing in spacings)} m.")
+        spacings = [aligned(scenario, scenario.flow.depth / cells) for cells in PROBE_CELLS]
+        on_probe(f"Probing this scene at spacings of {', '.join(f'{spacing:.4g}' for spacing in spacings)} m.")
         rungs, speed = [_rung(scenario, spacing, measure) for spacing in spacings], 1.0
         source = "from a probe of coarse runs"
-    return choose(rungs, scenario.flow.depth, accuracy=accuracy, budget=budget, speed=speed, source=source)
+    sold = sold_spacings(scenario, max(rung.spacing for rung in rungs))
+    return choose(rungs, sold, accuracy=accuracy, budget=budget, speed=speed, source=source)
 
 
 def choose(
     rungs: Sequence[Rung],
-    depth: float,
+    sold: Sequence[float],
     *,
     accuracy: float | None = None,
     budget: float | None = None,
@@ -195,43 +207,81 @@ def choose(
 
     Args:
         rungs: at least three spacings.
-        depth: of the flow [m].
+        sold: spacings to choose from [m], fine first.
         speed: time on this machine over that of the ladder.
     """
     law = _Law(rungs, speed)
-    coarsest, finest = max(rung.spacing for rung in rungs), depth / FINEST_CELLS
-    spacings = _round_spacings(finest, coarsest)
     if accuracy is not None:
-        kept = [s for s in spacings if law.error(s) <= accuracy]
+        kept = [s for s in sold if law.error(s) <= accuracy]
         if not kept:
-            best = spacings[0]
+            least = min(law.error(s) for s in sold)
+            best = max(s for s in sold if law.error(s) <= least * (1.0 + 1e-9))
             raise PurchaseError(
-                f"--accuracy {accuracy:.2%} cannot be promised for this scene: the finest spacing sold, "
-                f"{best:g} m, is expected to keep {law.error(best):.1%} in {law.time(best):.3g} s."
+                f"--accuracy {_text(accuracy)} cannot be promised for this scene: the best on offer is "
+                f"{_text(least, up=True)} at a spacing of {best:.4g} m, in {law.time(best):.3g} s."
             )
         spacing = max(kept)
     else:
         assert budget is not None
-        kept = [s for s in spacings if law.time(s) <= budget]
+        kept = [s for s in sold if law.time(s) <= budget]
         if not kept:
             raise PurchaseError(
-                f"--budget {budget:g}s is too short for this scene: the coarsest spacing sold, {spacings[-1]:g} m, "
-                f"takes {law.time(spacings[-1]):.3g} s."
+                f"--budget {budget:g}s is too short for this scene: the coarsest spacing sold, {sold[-1]:.4g} m, "
+                f"takes {law.time(sold[-1]):.3g} s."
             )
         spacing = min(kept)
     return Offer(spacing, law.time(spacing), law.errors(spacing), law.values, source)
 
 
-class _Law:
-    """Time and error against the spacing, fitted to a ladder.
+def aligned(scenario: Scenario, spacing: float) -> float:
+    """The nearest spacing that puts the barrier's crest on a grid line, or the flow's surface where that is higher.
 
-    The error is first order in the spacing, f = f0 + a h, by least squares; what a promise rests on is 1.25 |a h| plus
-    the scatter about the line, so that a ladder that wobbles buys less.
+    A crest between two grid lines is off by up to half a cell, at every spacing by another part of it.
+    """
+    length = _aligned_length(scenario)
+    return length / max(round(length / spacing), 1)
+
+
+def sold_spacings(scenario: Scenario, coarsest: float) -> list[float]:
+    """Spacings that `aligned` gives, from the finest sold to the coarsest that was measured [m]."""
+    length = _aligned_length(scenario)
+    first, last = math.ceil(length / coarsest - 1e-9), math.floor(FINEST_CELLS * length / scenario.flow.depth)
+    return [length / rows for rows in range(max(last, first), first - 1, -1)]
+
+
+def _aligned_length(scenario: Scenario) -> float:
+    barrier = scenario.barrier
+    depth = scenario.flow.depth
+    # The rows of a crest below the surface would be too few to choose from.
+    if barrier is not None and isinstance(barrier.shape, Trapezoid) and barrier.shape.base_crest_height[2] >= depth:
+        return barrier.shape.base_crest_height[2]
+    return depth
+
+
+def _text(share: float, *, up: bool = False) -> str:
+    """A percentage of two digits, rounded up where a promise must hold."""
+    percent = 100.0 * share
+    if up and percent > 0.0:
+        unit = 10.0 ** (math.floor(math.log10(percent)) - 1)
+        percent = math.ceil(percent / unit - 1e-9) * unit
+    return f"{percent:.2g}%"
+
+
+class _Law:
+    """Time and error against the spacing, from a ladder.
+
+    Where the ladder follows a first-order law f = f0 + a h, the error is 1.25 |a h| plus the scatter about the line.
+    Mostly it does not: the figures scatter by a per cent or more as the flow meets the grid in another way. The error
+    of a spacing is then what was seen, the greatest deviation of it and the finer ones from the finest, and no less
+    than the spread of the three finest: that finer spacings do better was not seen, so it is not promised.
     """
 
     def __init__(self, rungs: Sequence[Rung], speed: float):
+        rungs = sorted(rungs, key=lambda rung: rung.spacing)
         h = np.array([rung.spacing for rung in rungs])
-        self._slope, self._scatter = {}, {}
+        self._spacings = h
+        self._laws: dict[str, tuple[float, float]] = {}
+        self._seen: dict[str, Array] = {}
         self.values: dict[str, float] = {}
         for name in KEY_QUANTITIES:
             if not all(name in rung.figures for rung in rungs):
@@ -239,9 +289,12 @@ class _Law:
             f = np.array([rung.figures[name] for rung in rungs])
             basis = np.stack([np.ones_like(h), h], axis=1)
             (f0, a), *_ = np.linalg.lstsq(basis / h[:, None], f / h, rcond=None)
-            freedom = max(len(h) - 2, 1)
-            self._scatter[name] = float(np.sqrt(((f - basis @ (f0, a)) ** 2).sum() / freedom))
-            self._slope[name], self.values[name] = float(a), float(f0)
+            scatter = float(np.sqrt(((f - basis @ (f0, a)) ** 2).sum() / max(len(h) - 2, 1)))
+            if scatter < CLEAR * float(np.ptp(f)):
+                self.values[name], self._laws[name] = float(f0), (float(a), scatter)
+            else:
+                self.values[name] = float(f[0])
+                self._seen[name] = np.maximum(np.maximum.accumulate(np.abs(f - f[0])), np.ptp(f[:3]))
         if not self.values:
             raise PurchaseError("This scene has no barrier, so it has no figures whose accuracy could be bought.")
         # Fine runs tell more of finer ones.
@@ -252,10 +305,16 @@ class _Law:
         return float(np.exp(self._constant + self._exponent * np.log(spacing))) + OVERHEAD
 
     def errors(self, spacing: float) -> dict[str, float]:
-        return {
-            name: (SAFETY * abs(self._slope[name]) * spacing + self._scatter[name]) / max(abs(value), 1e-300)
-            for name, value in self.values.items()
-        }
+        found = {}
+        for name, value in self.values.items():
+            if name in self._laws:
+                slope, scatter = self._laws[name]
+                error = SAFETY * abs(slope) * spacing + scatter
+            else:  # between two rungs, as at the coarser one
+                place = int(np.searchsorted(self._spacings, spacing * (1.0 - 1e-9)))
+                error = float(self._seen[name][min(place, len(self._spacings) - 1)])
+            found[name] = error / max(abs(value), 1e-300)
+        return found
 
     def error(self, spacing: float) -> float:
         return max(self.errors(spacing).values())
@@ -297,7 +356,7 @@ def _rung(scenario: Scenario, spacing: float, measure: Callable[[Scenario], Resu
     (setting,) = ladder(scenario, [spacing])
     result = measure(setting.scenario)
     if result["status"] != "finished":
-        raise PurchaseError(f"The probe at {spacing:g} m failed: {result['problem']}")
+        raise PurchaseError(f"The probe at {spacing:.4g} m failed: {result['problem']}")
     return _rung_of(spacing, result)
 
 
@@ -305,10 +364,3 @@ def _rung_of(spacing: float, result: Result) -> Rung:
     figures = {name: result["figures"].get(name) for name in KEY_QUANTITIES}
     known = {name: float(f"{value:.7g}") for name, value in figures.items() if value is not None}
     return Rung(spacing, float(f"{result['cpu_time'] + result['recording_time']:.4g}"), known)
-
-
-def _round_spacings(finest: float, coarsest: float) -> list[float]:
-    """Spacings of two digits from fine to coarse."""
-    steps = range(math.ceil(48 * math.log10(coarsest / finest)) + 1)
-    values = {float(f"{coarsest * 10 ** (-step / 48):.2g}") for step in steps}
-    return sorted(value for value in values if finest <= value <= coarsest) or [coarsest]

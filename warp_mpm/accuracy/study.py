@@ -18,7 +18,7 @@ SERIES_INTERVAL = 0.01
 QUICK_SPACINGS, FULL_SPACINGS = (2.0, 1.5, 1.0, 0.75), (2.0, 1.5, 1.0, 0.75, 0.5, 0.375)
 """Spacings of the ladders over the scenario's own."""
 
-COARSE_SPACINGS = (2.5, 2.0, 1.5, 1.0)
+QUICK_LADDER, FULL_LADDER = (2.5, 2.0, 1.5, 1.0), (2.5, 2.0, 1.5, 1.0, 0.75, 0.5)
 """The same for many scenes at once."""
 
 COMBINATION_SPACINGS = (2.0, 1.5, 1.0)
@@ -103,14 +103,14 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
         if level != getattr(scenario.numerics, knob):
             settings += [_turned(base, knob, level, own * factor) for factor in COMBINATION_SPACINGS]
     for effect, other in without_effects(base).items():
-        settings.append(Setting(f"{effect}, spacing {at:g}", effect, None, _at(other, at), physics=True))
+        settings.append(Setting(f"{effect}, spacing {at:.4g}", effect, None, _at(other, at), physics=True))
     return list({setting.key: setting for setting in reversed(settings)}.values())[::-1]
 
 
 def ladder(scenario: Scenario, spacings: Sequence[float]) -> list[Setting]:
     """The scenario's own settings at several spacings [m]."""
     base = _bare(scenario)
-    return [Setting(f"spacing {spacing:g}", DEFAULT, None, _at(base, spacing)) for spacing in map(_round, spacings)]
+    return [Setting(f"spacing {spacing:.4g}", DEFAULT, None, _at(base, spacing)) for spacing in spacings]
 
 
 def without_effects(scenario: Scenario) -> dict[str, Scenario]:
@@ -169,7 +169,8 @@ def _bare(scenario: Scenario) -> Scenario:
 
 
 def _round(spacing: float) -> float:
-    return float(f"{spacing:.4g}")
+    """Without the last digits, which products of factors leave behind; 6 m / 17 stays a seventeenth of 6 m."""
+    return float(f"{spacing:.12g}")
 
 
 def _at(scenario: Scenario, spacing: float) -> Scenario:
@@ -178,7 +179,7 @@ def _at(scenario: Scenario, spacing: float) -> Scenario:
 
 def _turned(base: Scenario, knob: str, level: Any, spacing: float) -> Setting:
     scenario = _at(base, spacing).replaced({f"numerics.{knob}": level})
-    return Setting(f"{knob} {level_text(level)}, spacing {_round(spacing):g}", knob, level, scenario)
+    return Setting(f"{knob} {level_text(level)}, spacing {spacing:.4g}", knob, level, scenario)
 
 
 def level_text(level: Any) -> str:

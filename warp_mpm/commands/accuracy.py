@@ -40,6 +40,10 @@ def accuracy(
     jobs: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Runs at a time.", show_default="number of cores")
     ] = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Check what `run --accuracy` promises on ten scenes drawn around the scenario."),
+    ] = False,
     data: Annotated[
         Path | None,
         typer.Option(
@@ -53,24 +57,32 @@ def accuracy(
     runs.csv, and pictures. The same command again runs only what is missing; what was run is found by the hash of
     scene, settings and program.
 
-    Exit codes: 0 done, 2 the input cannot be used, 130 interrupted.
+    With --check, ten new scenes are drawn around the scenario, bought, run and compared with finer runs; the table is
+    in check.md.
+
+    Exit codes: 0 done, 1 the promises did not hold in nine of ten (--check), 2 the input cannot be used, 130 interrupted.
     """
     with refusals():
         from warp_mpm.accuracy.report import write_ladders, write_study
         from warp_mpm.accuracy.runner import run_settings
-        from warp_mpm.accuracy.study import COARSE_SPACINGS, FULL_SPACINGS, ladder, plan
+        from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, ladder, plan
         from warp_mpm.scenario import Scenario
 
         changes = {} if until is None else {"output.end_time_s": until}
         scenes = [Scenario.load(path).replaced(changes) for path in scenarios]
         name = scenarios[0].stem if len(scenes) == 1 else "ladders"
         folder = out if out is not None else Path("runs/accuracy") / name
+        if check:
+            if len(scenes) != 1 or data is not None or quick:
+                raise ValueError("--check draws scenes around one scenario; --quick and --data do not go with it.")
+            _check(scenes[0], folder)
+            return
         if data is not None and not data.parent.is_dir():
             raise ValueError(f"--data {data} must be a file in a folder that exists.")
         if len(scenes) == 1:
             plans = [plan(scenes[0], quick=quick)]
         else:
-            factors = COARSE_SPACINGS if quick else FULL_SPACINGS
+            factors = QUICK_LADDER if quick else FULL_LADDER
             plans = [ladder(scene, [factor * scene.numerics.spacing_m for factor in factors]) for scene in scenes]
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -94,6 +106,17 @@ def accuracy(
 
             write_data(data, list(zip(scenes, plans, strict=True)), results)
         typer.echo(f"Tables and pictures: {folder}", err=True)
+
+
+def _check(scenario: Scenario, folder: Path) -> None:
+    from warp_mpm.accuracy.check import check, drawn, holds, table
+
+    checks = check(drawn(scenario), folder / "checks", on_progress=lambda line: typer.echo(line, err=True))
+    text = table(checks)
+    (folder / "check.md").write_text(text, encoding="utf-8")
+    typer.echo(text)
+    if not holds(checks):
+        raise typer.Exit(1)
 
 
 def bought(

@@ -1,0 +1,201 @@
+"""Whether what is bought is what is got: on scenes that nobody measured before."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from warp_mpm.accuracy.measure import measure
+from warp_mpm.accuracy.purchase import Offer, PurchaseError, aligned, buy, figures_of
+from warp_mpm.accuracy.runner import Result
+from warp_mpm.accuracy.study import ladder, run_key
+from warp_mpm.scenario import Scenario
+
+SCENES, SEED = 10, 20261123
+"""Scenes drawn, and of what the draw begins."""
+
+ASKED = (0.05, 0.10, 0.20, 0.50)
+"""Accuracies asked for in turn, until one is granted."""
+
+TRUE_CELLS = 24.0
+"""Cells in the flow's depth of the run that counts as the truth."""
+
+TIME_FACTOR, ERROR_FACTOR, LEAST_SHARE = 1.5, 2.0, 0.9
+"""How far time and error may be off what was promised, and in what share of the scenes both must hold."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was promised for one scene, and what was got."""
+
+    scene: str
+    spacing: float
+    """Chosen [m]."""
+    true_spacing: float
+    """Of the run that counts as the truth [m]."""
+    asked: float
+    """Accuracy that was granted."""
+    promised_error: float
+    true_error: float
+    """Greatest of the key quantities' relative errors."""
+    worst: str
+    """The quantity that has it."""
+    promised_time: float
+    achieved_time: float
+    """[s] on a free core: of the processor, the whole command."""
+
+    @property
+    def time_holds(self) -> bool:
+        """Within the factor, either way."""
+        return 1.0 / TIME_FACTOR <= self.achieved_time / self.promised_time <= TIME_FACTOR
+
+    @property
+    def error_holds(self) -> bool:
+        """Within the factor."""
+        return self.true_error <= ERROR_FACTOR * self.promised_error
+
+
+def drawn(base: Scenario, count: int = SCENES, seed: int = SEED) -> list[Scenario]:
+    """Scenes around one with a trapezoidal barrier: another speed, depth, barrier and friction; every third is fixed.
+
+    Raises:
+        ValueError: the scene has no such barrier, or its flow is not given by a depth.
+    """
+    random, found = np.random.default_rng(seed), []
+    for number in range(count):
+        fixed = number % 3 == 2
+        speed, depth, angle, height, density, base_friction, internal = (
+            round(float(random.uniform(*limits)), digits)
+            for *limits, digits in (
+                *((6.0, 16.0, 1), (2.0, 4.0, 1), (50.0, 80.0, 0), (5.0, 7.0, 1)),
+                *((1600.0, 2600.0, -1), (0.2, 0.45, 2), (15.0, 30.0, 0)),
+            )
+        )
+        changes = {
+            "flow.velocity_m_per_s": [speed, 0.0],
+            "flow.shape.depth_m": depth,
+            "flow.material.friction_angle_deg": internal,
+            "barrier.shape.base_width_m": None,
+            "barrier.shape.height_m": height,
+            "barrier.shape.face_angle_deg": angle,
+            "barrier.motion": {"kind": "fixed"}
+            if fixed
+            else {"kind": "sliding", "density_kg_per_m3": density, "base_friction": base_friction},
+            "title": f"{speed:g} m/s, depth {depth:g} m, φ {internal:g}°, barrier {height:g} m at {angle:g}°, "
+            + ("fixed" if fixed else f"{density:g} kg/m³ on μ {base_friction:g}"),
+        }
+        found.append(base.replaced(changes))
+    return found
+
+
+def check(
+    scenes: Sequence[Scenario], folder: Path, *, on_progress: Callable[[str], None] = lambda line: None
+) -> list[Check]:
+    """Buy, run and compare; a scene that was checked before is not checked again.
+
+    Args:
+        scenes: to check.
+        folder: of the results, one file for each scene; made if need be.
+        on_progress: told each result.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    found = []
+    for number, scene in enumerate(scenes, 1):
+        path = folder / f"{run_key(scene)}.json"
+        if not path.is_file():
+            aside = path.with_suffix(".new")
+            aside.write_text(json.dumps(asdict(_check(scene)), ensure_ascii=False), encoding="utf-8")
+            aside.replace(path)
+        one = Check(**json.loads(path.read_text(encoding="utf-8")))
+        on_progress(
+            f"{number} of {len(scenes)}: {one.scene}: promised {one.promised_error:.1%} in {one.promised_time:.2g} s, "
+            f"got {one.true_error:.1%} in {one.achieved_time:.2g} s"
+        )
+        found.append(one)
+    return found
+
+
+def table(checks: Sequence[Check]) -> str:
+    """What came of it, in Markdown, with the verdict below."""
+    lines = [
+        "| scene | spacing | error: promised | true | of | time: promised | achieved | holds |",
+        "|---|---:|---:|---:|---|---:|---:|---|",
+    ]
+    for one in checks:
+        holds = {(True, True): "yes", (True, False): "error", (False, True): "time", (False, False): "no"}
+        lines.append(
+            f"| {one.scene} | {one.spacing:.3g} m | {one.promised_error:.1%} | {one.true_error:.1%} | {one.worst} | "
+            f"{one.promised_time:.2g} s | {one.achieved_time:.2g} s | {holds[one.error_holds, one.time_holds]} |"
+        )
+    both = sum(one.error_holds and one.time_holds for one in checks)
+    lines += [
+        "",
+        f"In {both} of {len(checks)} scenes the time was within a factor {TIME_FACTOR:g} of the promised and the true "
+        f"error, against a run of {TRUE_CELLS:g} cells in the flow's depth, within {ERROR_FACTOR:g} times the promised.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def holds(checks: Sequence[Check]) -> bool:
+    """Whether time and error hold in nine of ten."""
+    return sum(one.error_holds and one.time_holds for one in checks) >= LEAST_SHARE * len(checks)
+
+
+def _check(scene: Scenario) -> Check:
+    offer, asked = _bought(scene)
+    chosen = scene.replaced({"numerics.spacing_m": offer.spacing})
+    with tempfile.TemporaryDirectory() as name:
+        file, run = Path(name) / "scene.json", Path(name) / "run"
+        file.write_text(json.dumps(chosen.resolved()), encoding="utf-8")
+        before = os.times()
+        subprocess.run(
+            [sys.executable, "-m", "warp_mpm", "run", str(file), "--out", str(run), "--quiet"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+        after = os.times()
+        got = figures_of(run)
+    achieved = after.children_user + after.children_system - before.children_user - before.children_system
+    (true_setting,) = ladder(scene, [aligned(scene, scene.flow.depth / TRUE_CELLS)])
+    truth = measure(true_setting.scenario)["figures"]
+    errors = {name: abs(got[name] - truth[name]) / abs(truth[name]) for name in offer.errors}
+    worst = max(errors, key=lambda name: errors[name])
+    return Check(
+        scene=scene.title or "",
+        spacing=offer.spacing,
+        true_spacing=true_setting.spacing,
+        asked=asked,
+        promised_error=offer.error,
+        true_error=errors[worst],
+        worst=worst.replace("barrier_displacement_final", "sliding distance").replace("_", " "),
+        promised_time=offer.time,
+        achieved_time=achieved,
+    )
+
+
+def _bought(scene: Scenario) -> tuple[Offer, float]:
+    """The first of `ASKED` that is granted; the probes are run once."""
+    probed: dict[str, Result] = {}
+
+    def probe(scenario: Scenario) -> Result:
+        key = run_key(scenario)
+        if key not in probed:
+            probed[key] = measure(scenario)
+        return probed[key]
+
+    refusal: PurchaseError | None = None
+    for asked in ASKED:
+        try:
+            return buy(scene, accuracy=asked, measure=probe), asked
+        except PurchaseError as error:
+            refusal = error
+    assert refusal is not None
+    raise refusal
