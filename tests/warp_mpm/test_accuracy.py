@@ -239,7 +239,7 @@ class TestPurchase:
         assert offer.values["peak_force"] == 4e5
 
     def test_no_spacing_finer_than_was_run_is_promised_to_wobble_less(self) -> None:
-        with pytest.raises(PurchaseError, match=r"best on offer is 3(\.1)?% at a spacing of 0\.4 m"):
+        with pytest.raises(PurchaseError, match=r"best on offer is 3(\.1)?% at a spacing of 0\.375 m"):
             choose(self.WOBBLE, self.SOLD, accuracy=0.029)
         assert choose(self.WOBBLE, self.SOLD, budget=3600.0).error == pytest.approx(0.03)
 

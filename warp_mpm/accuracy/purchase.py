@@ -287,6 +287,8 @@ class _Law:
             if not all(name in rung.figures for rung in rungs):
                 continue
             f = np.array([rung.figures[name] for rung in rungs])
+            if not f.any():  # a barrier that could slide but does not
+                continue
             basis = np.stack([np.ones_like(h), h], axis=1)
             (f0, a), *_ = np.linalg.lstsq(basis / h[:, None], f / h, rcond=None)
             scatter = float(np.sqrt(((f - basis @ (f0, a)) ** 2).sum() / max(len(h) - 2, 1)))

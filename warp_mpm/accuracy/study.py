@@ -15,7 +15,7 @@ from warp_mpm.scenario import DryFlow, Scenario, TwoPhaseFlow, UndrainedFlow
 SERIES_INTERVAL = 0.01
 """Interval of the forces [s]: a peak force is the greatest mean over it."""
 
-QUICK_SPACINGS, FULL_SPACINGS = (2.0, 1.5, 1.0, 0.75), (2.0, 1.5, 1.0, 0.75, 0.5, 0.375)
+QUICK_SPACINGS, FULL_SPACINGS = (2.0, 1.5, 1.0, 0.75), (2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25)
 """Spacings of the ladders over the scenario's own."""
 
 QUICK_LADDER, FULL_LADDER = (2.5, 2.0, 1.5, 1.0), (2.5, 2.0, 1.5, 1.0, 0.75, 0.5)

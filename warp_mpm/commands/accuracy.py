@@ -60,7 +60,8 @@ def accuracy(
     With --check, ten new scenes are drawn around the scenario, bought, run and compared with finer runs; the table is
     in check.md.
 
-    Exit codes: 0 done, 1 the promises did not hold in nine of ten (--check), 2 the input cannot be used, 130 interrupted.
+    Exit codes: 0 done, 1 the promises did not hold in nine of ten scenes (--check), 2 the input cannot be used,
+    130 interrupted.
     """
     with refusals():
         from warp_mpm.accuracy.report import write_ladders, write_study
