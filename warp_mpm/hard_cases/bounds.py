@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.grid import barrier_planes
-from warp_mpm.scenario import Prescribed, Scenario
+from warp_mpm.scenario import Prescribed, Scenario, TwoPhaseMaterial
 from warp_mpm.time_step import step_limits
 
 
@@ -50,14 +50,16 @@ def pressure_bound(scenario: Scenario, speed: float) -> float:
 
 
 def voids_close(scenario: Scenario) -> bool:
-    """Whether the impact or the weight presses the voids shut: p = rho U u + rho g h reaches the pressure at which
-    they are, rho c² n / (1 - n) by the law of the skeleton and -rho c² ln(1 - n) by that of the liquid."""
+    """Whether impact or weight press the voids of the skeleton shut where it is alone, its liquid drained or apart.
+
+    The pressure rho U u + rho g h, with the skeleton's own c² = E_oed / rho, reaches rho c² n / (1 - n), at which the
+    law of the skeleton has no voids left.
+    """
     material, speed = scenario.flow.material, impact_speed(scenario)
-    sound, n = step_limits(scenario).sound_speed, material.porosity
+    stiffness, n = material.oedometric_modulus / material.density, material.porosity
     at_rest = scenario.gravity.acceleration_m_per_s2 * float(np.ptp(scenario.flow.polygon[:, 1]))
-    shock = 0.5 * speed + math.hypot(0.5 * speed, sound)
-    closing = sound**2 * (n / (1.0 - n) if scenario.flow.formulation == "dry" else -math.log1p(-n))
-    return shock * speed + at_rest >= closing
+    shock = 0.5 * speed + math.sqrt(0.25 * speed**2 + stiffness)
+    return shock * speed + at_rest >= stiffness * n / (1.0 - n)
 
 
 def closing_angle(scenario: Scenario) -> float:
@@ -95,12 +97,17 @@ def speed_bound(scenario: Scenario) -> float:
     the liquid piles up before it (Wagner 1932): w = (pi / 2) u_n / tan(theta). Beyond the speed U of the shock there is
     no jet, as no news of the free surface reaches the point (Lesser 1981): w <= U. Seen from that point the flow comes
     at sqrt(w² + u_n²) with a pressure of at most that of the shock, rho U u_n, and leaves along the surface without:
-    by Bernoulli at sqrt(w² + u_n² + 2 U u_n); seen from the surface faster by w + u_t. Of all angles, the worst. What
-    later breaks over the flow may close at smaller angles still; the bound takes those of the scene as given.
+    by Bernoulli at sqrt(w² + u_n² + 2 U u_n); seen from the surface faster by w + u_t. Of all angles, the worst. Liquid
+    that drains out of its skeleton takes all of the pressure on its own density, so that there 2 U u_n is greater by
+    rho / rho_L. What later breaks over the flow may close at smaller angles still; the bound takes those of the scene.
     """
+    material = scenario.flow.material
+    lightness = 1.0
+    if isinstance(material, TwoPhaseMaterial):
+        lightness = max(1.0, material.density / material.liquid_density_kg_per_m3)
     angle = np.linspace(0.0, 0.5 * math.pi, 181)
     speed, theta = impact_speed(scenario), closing_angle(scenario)
     across, along = speed * np.cos(angle), speed * np.sin(angle)
     shock = shock_speed(scenario, across)
     running = shock if theta == 0.0 else np.minimum(shock, 0.5 * math.pi * across / math.tan(theta))
-    return float(np.max(along + running + np.sqrt(running**2 + across**2 + 2.0 * shock * across)))
+    return float(np.max(along + running + np.sqrt(running**2 + across**2 + 2.0 * lightness * shock * across)))

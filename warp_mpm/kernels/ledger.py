@@ -93,8 +93,10 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
         deviatoric = squares - trace * trace / F(3.0)
         grains = parameters.grain_share * reference
-        elastic = wp.float64(wp.max(volume, grains) * deviatoric / (F(4.0) * parameters.shear_modulus))
         mean = wp.float64(-trace / F(3.0))
+        # Shear stress s at the volume V was s V / V_0 before the volume changed, which does no work on it.
+        stretch = wp.max(one + mean / wp.float64(parameters.bulk_modulus), wp.float64(1.0e-6))
+        elastic = wp.float64(volume * deviatoric / (F(4.0) * parameters.shear_modulus)) / stretch
         # In double precision always: the work is a small difference of the terms.
         elastic += stored_in_skeleton(mean, wp.float64(volume), wp.float64(grains), wp.float64(parameters.bulk_modulus))
         sound = wp.isfinite(squares) and wp.isfinite(volume) and wp.isfinite(speed)
