@@ -127,12 +127,13 @@ def run(
             RunFolder.check(folder, force=force)
     except RunFolderError as error:
         _refuse(str(error))
-    offer, bought_at = None, time.process_time()
+    offer, probing = None, 0.0
     if accuracy is not None or budget is not None:
         from warp_mpm.commands.accuracy import bought
 
+        begun = time.process_time()
         offer, scenario = bought(scenario, accuracy, budget, device, quiet=quiet)
-        bought_at = time.process_time()
+        probing = time.process_time() - begun
     from warp_mpm.simulation import Simulation, SimulationDiverged
 
     def make_simulation(scenario: Scenario) -> Simulation:
@@ -182,7 +183,7 @@ def run(
         if report and not quiet:
             typer.echo(f"The report is {folder / 'report.html'}")
     if offer is not None and outcome.finished and not quiet:
-        typer.echo(offer.settled(folder, time.process_time() - bought_at), err=True)
+        typer.echo(offer.settled(folder, time.process_time() - probing), err=True)
     if not outcome.finished:
         _complain(
             f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "

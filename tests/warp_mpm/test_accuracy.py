@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from warp_mpm.accuracy.check import Check, drawn, holds, table
 from warp_mpm.accuracy.errors import errors, extrapolate, references
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.purchase import (
@@ -223,7 +225,9 @@ class TestPurchase:
 
     def test_says_what_can_be_had(self) -> None:
         # 1.25 times 0.2 times 3 m / 120.
-        with pytest.raises(PurchaseError, match=r"--accuracy 0\.1% .* best on offer is 0\.63% at a spacing of 0\.025 m"):
+        with pytest.raises(
+            PurchaseError, match=r"--accuracy 0\.1% .* best on offer is 0\.63% at a spacing of 0\.025 m"
+        ):
             choose(self.LADDER, self.SOLD, accuracy=0.001)
         with pytest.raises(PurchaseError, match=r"coarsest spacing sold, 0\.5 m"):
             choose(self.LADDER, self.SOLD, budget=1.0)
@@ -279,6 +283,43 @@ class TestPurchase:
         force = np.sin(7.0 * time)
         halves = 0.5 * (force[1::2] + force[2::2])
         assert peak_mean(time, force, 0.01) == pytest.approx(halves.max(), rel=1e-12)
+
+
+class TestCheck:
+    ONE = Check("a scene", 0.4, 0.12, "5%", 0.04, 0.02, "impulse", 4.0, 5.0)
+
+    def test_draws_the_same_scenes_that_differ(self, scene: Scenario) -> None:
+        scenes = drawn(scene)
+        assert [s.resolved() for s in scenes] == [s.resolved() for s in drawn(scene)]
+        assert len({scene_key(s) for s in scenes}) == 10
+        motions = [s.barrier.motion.kind for s in scenes if s.barrier is not None]
+        assert motions.count("fixed") == 3
+        assert motions.count("sliding") == 7
+        assert len({s.flow.depth for s in scenes}) > 5
+        assert len({s.flow.speed for s in scenes}) > 5
+
+    @pytest.mark.parametrize(
+        ("change", "error_holds", "time_holds"),
+        [
+            ({}, True, True),
+            ({"true_error": 0.079}, True, True),
+            ({"true_error": 0.081}, False, True),
+            ({"achieved_time": 5.9}, True, True),
+            ({"achieved_time": 6.1}, True, False),
+            ({"achieved_time": 2.6}, True, False),  # too early is off as well
+        ],
+    )
+    def test_judges_each_promise(self, change: dict[str, float], error_holds: bool, time_holds: bool) -> None:
+        one = replace(self.ONE, **change)
+        assert (one.error_holds, one.time_holds) == (error_holds, time_holds)
+
+    def test_nine_of_ten(self) -> None:
+        broken = [replace(self.ONE, true_error=0.2), replace(self.ONE, achieved_time=60.0)]
+        assert holds([self.ONE] * 9 + broken[:1])
+        assert not holds([self.ONE] * 8 + broken)
+        text = table([self.ONE] * 8 + broken)
+        assert "In 8 of 10 scenes" in text
+        assert [line.split("|")[-2].strip() for line in text.splitlines()[2:12]] == ["yes"] * 8 + ["error", "time"]
 
 
 class TestRunner:

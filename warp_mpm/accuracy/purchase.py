@@ -39,8 +39,8 @@ CLEAR = 0.25
 TIMED = 0.5
 """Least time of a shipped rung [s] that is worth running to learn how fast a machine is."""
 
-OVERHEAD = 1.5
-"""Time of a process and its files [s] beside the stepping: imports, compiled kernels, figures."""
+OVERHEAD = 2.3
+"""Time of a command [s] beside the stepping: imports, compiled kernels, files, figures; measured."""
 
 
 class PurchaseError(ValueError):
@@ -180,7 +180,7 @@ def buy(
     default = type(scenario.numerics)()
     own = scenario.numerics.model_copy(update={"spacing_m": default.spacing_m})
     if shipped is not None and own == default:
-        timed = max(rung.spacing for rung in shipped if rung.time > TIMED or rung is shipped[-1])
+        timed = max((rung.spacing for rung in shipped if rung.time > TIMED), default=shipped[-1].spacing)
         on_probe(f"This scene was measured before; a run at {timed:g} m tells how fast this machine is.")
         there = next(rung for rung in shipped if rung.spacing == timed)
         rungs, speed = shipped, _rung(scenario, timed, measure).time / there.time
