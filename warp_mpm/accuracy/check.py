@@ -138,7 +138,12 @@ def table(checks: Sequence[Check]) -> str:
         "|---|---:|---:|---:|---:|---|---:|---:|---|",
     ]
     for one in checks:
-        holds = {(True, True): "yes", (True, False): "error", (False, True): "time", (False, False): "no"}
+        holds = {
+            (True, True): "yes",
+            (True, False): "not the time",
+            (False, True): "not the error",
+            (False, False): "no",
+        }
         lines.append(
             f"| {one.scene} | {one.asked} | {one.spacing:.3g} m | "
             f"{one.promised_error:.1%} | {one.true_error:.1%} | {one.worst} | "
