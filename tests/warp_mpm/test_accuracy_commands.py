@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.accuracy import purchase
+from warp_mpm.accuracy.report import put_into_page
 from warp_mpm.accuracy.study import scene_key
 from warp_mpm.cli import app
 from warp_mpm.scenario import Scenario
@@ -83,6 +84,31 @@ def test_accuracy_refuses_a_folder_that_is_none(coarse: Path, tmp_path: Path) ->
     result = CliRunner().invoke(app, ["accuracy", str(coarse), "--data", str(tmp_path / "no" / "data.json")])
     assert result.exit_code == 2
     assert "must be a file in a folder that exists" in result.stderr
+
+
+def test_result_goes_into_the_page_and_nothing_else_changes(tmp_path: Path) -> None:
+    page, picture = tmp_path / "page.md", tmp_path / "picture.png"
+    page.write_text("before\n<!-- accuracy one -->\nold\n<!-- end -->\n<!-- accuracy two -->\nkept\n<!-- end -->\n")
+    picture.write_bytes(b"drawn")
+    for _ in range(2):  # the second time replaces the first
+        put_into_page(page, "one", "| a table |\n", [picture])
+        text = page.read_text()
+        assert text.startswith("before\n<!-- accuracy one -->\n")
+        assert "old" not in text
+        assert text.count("| a table |") == text.count("images/accuracy/one_picture.png") == 1
+        assert text.endswith("<!-- end -->\n<!-- accuracy two -->\nkept\n<!-- end -->\n")
+    assert (tmp_path / "images" / "accuracy" / "one_picture.png").read_bytes() == b"drawn"
+
+
+def test_page_without_a_place_is_refused_before_anything_runs(coarse: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("no place")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["accuracy", str(coarse), "--out", str(out), "--page", str(page)])
+    assert result.exit_code == 2
+    assert "with the line <!-- accuracy out -->" in " ".join(result.stderr.split())
+    assert not out.exists()
+    assert page.read_text() == "no place"
 
 
 @pytest.mark.slow

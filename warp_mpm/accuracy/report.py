@@ -10,7 +10,7 @@ from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import Setting
-from warp_mpm.accuracy.tables import csv_table, formula_errors, markdown
+from warp_mpm.accuracy.tables import csv_table, effects_table, formula_errors, formulas_table, markdown, prices
 from warp_mpm.accuracy.verdict import Study, evaluate, sentences
 from warp_mpm.plotting.style import save
 from warp_mpm.scenario import Scenario
@@ -33,10 +33,62 @@ def write_study(
     return sentences(study)
 
 
+def study_block(scenario: Scenario, settings: Sequence[Setting], results: Mapping[str, Result]) -> str:
+    """What a page shows of a study: what each percent costs, what each setting does, and the prices of leaving out.
+
+    Raises:
+        ValueError: as in `write_study`.
+    """
+    study, found = evaluate(scenario, settings, results), formulas(scenario)
+    spent = sum(row.result["cpu_time"] + row.result["recording_time"] for row in study.rows)
+    lines = [f"{len(settings)} runs, {spent:.0f} s of one core without the effects left out.", "", *prices(study), ""]
+    lines += ["What the program concludes from it:", "", *(f"- {said}" for said in sentences(study)), ""]
+    if study.effects:
+        lines += ["**Leaving an effect out.** " + effects_table(study)[0], *effects_table(study)[1:], ""]
+    if found:
+        lines += ["**Answers without a simulation.** " + formulas_table(study, found)[0]]
+        lines += [*formulas_table(study, found)[1:], ""]
+    return "\n".join(lines)
+
+
+def put_into_page(page: Path, name: str, block: str, pictures: Sequence[Path]) -> None:
+    """Replace what stands in a Markdown page between `<!-- accuracy NAME -->` and the next `<!-- end -->`.
+
+    Pictures are copied into `images/accuracy` beside the page and shown above the block.
+
+    Raises:
+        ValueError: as in `place_in`.
+    """
+    before, after = place_in(page, name)
+    shown = []
+    folder = page.parent / "images" / "accuracy"
+    folder.mkdir(parents=True, exist_ok=True)
+    for picture in pictures:
+        target = folder / f"{name}_{picture.name}"
+        target.write_bytes(picture.read_bytes())
+        shown += [f"![{name}, {picture.stem.replace('_', ' ')}](images/accuracy/{target.name})", ""]
+    _write(page, "\n".join([before, "", *shown, block.rstrip(), "", after]))
+
+
+def place_in(page: Path, name: str) -> tuple[str, str]:
+    """What a page holds up to and with `<!-- accuracy NAME -->`, and from the next `<!-- end -->` on.
+
+    Raises:
+        ValueError: the page cannot be read, or has no such place.
+    """
+    begin, end = f"<!-- accuracy {name} -->", "<!-- end -->"
+    text = page.read_text(encoding="utf-8") if page.is_file() else ""
+    before, found, rest = text.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise ValueError(f"--page {page} must be a file with the line {begin} and, below it, {end}.")
+    return before + begin, end + after
+
+
 def write_ladders(
     folder: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]], results: Mapping[str, Result]
-) -> None:
-    """Write the price of the closed form over several scenes: `closed_form.md` and `closed_form.png`.
+) -> str:
+    """Write the price of the closed form over scenes: `closed_form.md` and `closed_form.png`; returns the table.
 
     Raises:
         ValueError: fewer than three spacings of a scene came to their end.
@@ -44,8 +96,7 @@ def write_ladders(
     studies = [(evaluate(scene, settings, results), formulas(scene)) for scene, settings in scenes]
     drawn = [(study, found) for study, found in studies if study.references.key_names]
     save(pictures.price_of_the_closed_form(drawn), folder / "closed_form.png")
-    lines = ["# The price of the closed form", "", "Errors against the converged simulation (SI: as stated).", ""]
-    lines += ["| scene | answer | time | " + " | ".join(QUANTITIES[n].label for n in pictures.PRICED) + " |"]
+    lines = ["| scene | answer | time | " + " | ".join(QUANTITIES[n].label for n in pictures.PRICED) + " |"]
     lines += ["|---|---|---:|" + "---:|" * len(pictures.PRICED)]
     for study, found in drawn:
         lines.append(_reference_line(study))
@@ -53,7 +104,10 @@ def write_ladders(
             wrong = formula_errors(study, formula)
             cells = [f"{wrong[n]:+.0%}" if n in wrong else "–" for n in pictures.PRICED]
             lines.append(f"| | {formula.name} | {formula.time * 1e6:.2g} µs | " + " | ".join(cells) + " |")
-    _write(folder / "closed_form.md", "\n".join(lines) + "\n")
+    table = "\n".join(lines) + "\n"
+    about = "# The price of the closed form\n\nErrors against the converged simulation.\n\n"
+    _write(folder / "closed_form.md", about + table)
+    return table
 
 
 def _reference_line(study: Study) -> str:

@@ -7,7 +7,7 @@ from io import StringIO
 
 from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
-from warp_mpm.accuracy.verdict import Study, sentences
+from warp_mpm.accuracy.verdict import TARGETS, Study, sentences
 
 SHOWN = ("peak_force", "impulse", "barrier_displacement_final", "pore_pressure_max", "energy_curve")
 """Quantities of the Markdown table; the CSV has all."""
@@ -38,8 +38,32 @@ def csv_table(study: Study) -> str:
     return text.getvalue()
 
 
+def prices(study: Study) -> list[str]:
+    """What each percent costs, quantity by quantity: the cheapest setting of all that keeps it."""
+    lines = [
+        "| quantity | reference | known to | observed order | "
+        + " | ".join(f"{target:.0%} costs" for target in TARGETS)
+        + " |",
+        "|---|---:|---:|---:|" + "---|" * len(TARGETS),
+    ]
+    for name in ["overall", *study.references.names]:
+        cells = ["**key figures**, the worst", "", "", ""]
+        if name != "overall":
+            quantity, reference = QUANTITIES[name], study.references.scalars.get(name)
+            cells = [quantity.label, "a curve", "", ""]
+            if reference is not None:
+                cells[1] = f"{reference.value * quantity.factor:.4g} {quantity.unit}"
+                cells[3] = "none" if reference.order is None else f"{reference.order:.2g}"
+        cells[2] = f"± {study.doubt(name):.1%}"
+        for target in TARGETS:
+            row = study.price(name, target)
+            cells.append("–" if row is None else f"{row.time:.2g} s ({row.setting.name})")
+        lines.append("| " + " | ".join(cells) + " |")
+    return [*lines, "", "–: no setting of the study keeps it, or the reference is not known so well."]
+
+
 def markdown(study: Study, found: list[Formula]) -> str:
-    """The study in a page: what it says, references, runs, effects, formulas."""
+    """The study in a page: what it says, prices, runs, effects, formulas."""
     shown = [name for name in SHOWN if name in study.references.names]
     lines = [f"# What accuracy costs: {study.scenario.title}", ""]
     lines += [
@@ -53,24 +77,12 @@ def markdown(study: Study, found: list[Formula]) -> str:
         "",
         *(f"- {sentence}" for sentence in sentences(study)),
         "",
-        "## References",
+        "## What each percent costs",
         "",
-        "| quantity | reference | uncertainty | observed order |",
-        "|---|---:|---:|---:|",
+        *prices(study),
     ]
-    for name, reference in study.references.scalars.items():
-        quantity = QUANTITIES[name]
-        order = "none: the finest run" if reference.order is None else f"{reference.order:.2g}"
-        lines.append(
-            f"| {quantity.label.split(' (')[0]} | {reference.value * quantity.factor:.4g} {quantity.unit} | "
-            f"± {study.references.uncertainty(name):.1%} | {order} |"
-        )
-    for name in study.references.curves:
-        lines.append(f"| {QUANTITIES[name].label} | finest run | ± {study.references.uncertainty(name):.1%} | |")
     lines += ["", "## Runs, cheapest first", ""]
-    headings = ["setting", "CPU time [s]", "steps", "key figures"] + [
-        QUANTITIES[name].label.split(" (")[0] for name in shown
-    ]
+    headings = ["setting", "CPU time [s]", "steps", "key figures"] + [_short(name) for name in shown]
     lines += ["| " + " | ".join(headings) + " | front |", "|---|" + "---:|" * (len(headings) - 1) + "---|"]
     for row in sorted(study.rows, key=lambda row: row.time):
         cells = [row.setting.name, f"{row.time:.2g}", str(row.result["steps"])]
@@ -80,33 +92,41 @@ def markdown(study: Study, found: list[Formula]) -> str:
             cells += ["diverged", *("" for _ in shown)]
         lines.append("| " + " | ".join(cells) + f" | {'*' if row in study.fronts['overall'] else ''} |")
     if study.effects:
-        names = [name for name in study.references.scalars if any(name in effect.changes for effect in study.effects)]
-        lines += [
-            "",
-            "## The price of leaving an effect out",
-            "",
-            "Changes from the whole scene at the same spacing.",
-            "",
-        ]
-        lines += [
-            "| in place of the whole | CPU time | "
-            + " | ".join(QUANTITIES[n].label.split(" (")[0] for n in names)
-            + " |"
-        ]
-        lines += ["|---|---:|" + "---:|" * len(names)]
-        for effect in study.effects:
-            cells = [effect.name, f"{effect.time_ratio:.0%}", *(_signed(effect.changes.get(name)) for name in names)]
-            lines.append("| " + " | ".join(cells) + " |")
+        lines += ["", "## The price of leaving an effect out", "", *effects_table(study)]
     if found:
-        names = [name for name in study.references.scalars if any(name in formula.figures for formula in found)]
-        lines += ["", "## The price of the closed form", "", "Errors against the converged simulation.", ""]
-        lines += ["| formula | time | " + " | ".join(QUANTITIES[n].label.split(" (")[0] for n in names) + " |"]
-        lines += ["|---|---:|" + "---:|" * len(names)]
-        for formula in found:
-            errors = formula_errors(study, formula)
-            cells = [formula.name, f"{formula.time * 1e6:.2g} µs", *(_signed(errors.get(name)) for name in names)]
-            lines.append("| " + " | ".join(cells) + " |")
+        lines += ["", "## The price of the closed form", "", *formulas_table(study, found)]
     return "\n".join(lines) + "\n"
+
+
+def effects_table(study: Study) -> list[str]:
+    """How far off and how much faster the scene is without one effect."""
+    names = [name for name in study.references.scalars if any(name in effect.changes for effect in study.effects)]
+    lines = [
+        "Changes from the whole scene at the same spacing.",
+        "",
+        "| in place of the whole | CPU time | " + " | ".join(_short(name) for name in names) + " |",
+        "|---|---:|" + "---:|" * len(names),
+    ]
+    for effect in study.effects:
+        cells = [effect.name, f"{effect.time_ratio:.0%}", *(_signed(effect.changes.get(name)) for name in names)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def formulas_table(study: Study, found: list[Formula]) -> list[str]:
+    """Time and errors of the answers without a simulation."""
+    names = [name for name in study.references.scalars if any(name in formula.figures for formula in found)]
+    lines = [
+        "Errors against the converged simulation.",
+        "",
+        "| formula | time | " + " | ".join(_short(name) for name in names) + " |",
+        "|---|---:|" + "---:|" * len(names),
+    ]
+    for formula in found:
+        errors = formula_errors(study, formula)
+        cells = [formula.name, f"{formula.time * 1e6:.2g} µs", *(_signed(errors.get(name)) for name in names)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
 
 
 def formula_errors(study: Study, formula: Formula) -> dict[str, float]:
@@ -125,3 +145,7 @@ def _number(value: float | None) -> str:
 
 def _signed(value: float | None) -> str:
     return "–" if value is None else f"{value:+.1%}"
+
+
+def _short(name: str) -> str:
+    return QUANTITIES[name].label.split(" (")[0]

@@ -50,6 +50,15 @@ def accuracy(
             metavar="FILE", help="Write what `run --accuracy` needs to know of these scenes.", show_default=False
         ),
     ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Markdown page to put the result into, below its line <!-- accuracy NAME -->; "
+            "NAME is that of the folder.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Measure what accuracy costs in time: error against time over the settings that matter.
 
@@ -64,7 +73,7 @@ def accuracy(
     130 interrupted.
     """
     with refusals():
-        from warp_mpm.accuracy.report import write_ladders, write_study
+        from warp_mpm.accuracy.report import place_in, put_into_page, study_block, write_ladders, write_study
         from warp_mpm.accuracy.runner import run_settings
         from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, ladder, plan
         from warp_mpm.scenario import Scenario
@@ -73,10 +82,12 @@ def accuracy(
         scenes = [Scenario.load(path).replaced(changes) for path in scenarios]
         name = scenarios[0].stem if len(scenes) == 1 else "ladders"
         folder = out if out is not None else Path("runs/accuracy") / name
+        if page is not None:
+            place_in(page, folder.name)
         if check:
             if len(scenes) != 1 or data is not None or quick:
                 raise ValueError("--check draws scenes around one scenario; --quick and --data do not go with it.")
-            _check(scenes[0], folder)
+            _check(scenes[0], folder, page)
             return
         if data is not None and not data.parent.is_dir():
             raise ValueError(f"--data {data} must be a file in a folder that exists.")
@@ -100,8 +111,13 @@ def accuracy(
         if len(scenes) == 1:
             for sentence in write_study(folder, scenes[0], plans[0], results):
                 typer.echo(sentence)
+            block = study_block(scenes[0], plans[0], results)
+            pictures = [folder / "error_against_time.png", folder / "each_setting.png", folder / "where_time_goes.png"]
         else:
-            write_ladders(folder, list(zip(scenes, plans, strict=True)), results)
+            block = write_ladders(folder, list(zip(scenes, plans, strict=True)), results)
+            pictures = [folder / "closed_form.png"]
+        if page is not None:
+            put_into_page(page, folder.name, block, pictures)
         if data is not None:
             from warp_mpm.accuracy.purchase import write_data
 
@@ -109,13 +125,16 @@ def accuracy(
         typer.echo(f"Tables and pictures: {folder}", err=True)
 
 
-def _check(scenario: Scenario, folder: Path) -> None:
+def _check(scenario: Scenario, folder: Path, page: Path | None) -> None:
     from warp_mpm.accuracy.check import check, drawn, holds, table
+    from warp_mpm.accuracy.report import put_into_page
 
     checks = check(drawn(scenario), folder / "checks", on_progress=lambda line: typer.echo(line, err=True))
     text = table(checks)
     (folder / "check.md").write_text(text, encoding="utf-8")
     typer.echo(text)
+    if page is not None:
+        put_into_page(page, folder.name, text, [])
     if not holds(checks):
         raise typer.Exit(1)
 
