@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from warp_mpm.effect_rules import effect_rules
-from warp_mpm.performance.benchmark import SHORT, Table, _ladder
+from warp_mpm.performance.benchmark import SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
+from warp_mpm.performance.table import Table
+from warp_mpm.performance.whole_runs import recording_shares
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.plotting import save
 from warp_mpm.simulation import Simulation
@@ -83,3 +85,16 @@ def test_a_probe_stays_within_the_run(load_scene):
         assert stepper.chunk(0.05) > 0.0
         assert stepper.simulation.time <= 0.1
     assert stepper.furthest == pytest.approx(0.1)
+
+
+def test_shares_of_a_run(load_scene):
+    """They add up to the whole, and a run that records more often spends more on it."""
+    scene = load_scene("case_1", **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.3})
+    often = scene.replaced({"output.snapshot_interval_s": 0.005})
+    (points, shares, each), (_, dear, _) = recording_shares(scene, device="cpu"), recording_shares(often, device="cpu")
+    assert points == 732
+    assert set(shares) == {"steps", "samples", "snapshots", "python"}
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert all(0.0 < share < 1.0 for share in shares.values())
+    assert all(seconds > 0.0 for seconds in each.values())
+    assert dear["snapshots"] > 2.0 * shares["snapshots"]

@@ -13,7 +13,7 @@ import typer
 from warp_mpm.commands.refusals import refusals
 
 if TYPE_CHECKING:
-    from warp_mpm.performance.benchmark import Table
+    from warp_mpm.performance.table import Table
 
 
 class What(StrEnum):
@@ -42,8 +42,8 @@ def benchmark(
 
     with refusals():
         from warp_mpm.performance.benchmark import CASE, effect_costs, machine, speed_tables
-        from warp_mpm.performance.benchmark import Table as Made
         from warp_mpm.performance.chart import effects_chart
+        from warp_mpm.performance.table import Table as Made
         from warp_mpm.plotting import save
         from warp_mpm.scenario import Scenario
 

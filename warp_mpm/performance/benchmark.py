@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import platform
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from warp_mpm.effect_rules import without_liquid
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
+from warp_mpm.performance.table import Progress, Table
+from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
 from warp_mpm.performance.yardstick import Yardstick
-from warp_mpm.recording import SnapshotRecorder, TimeSeriesRecorder, record_until
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 
@@ -25,23 +20,6 @@ SHORT: dict[str, Any] = {"numerics.spacing_m": 0.125, "output.end_time_s": 0.5}
 
 ROUNDS, TURN = 11, 0.1
 """Turns that each measurement has, and their length [s]."""
-
-Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of a benchmark, for the terminal, for JSON and for a page."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-
-    def markdown(self) -> str:
-        """As a table of Markdown."""
-        lines = ["| " + " | ".join(self.columns) + " |", "|" + "---|" * len(self.columns)]
-        lines += ["| " + " | ".join(row) + " |" for row in self.rows]
-        return f"**{self.title}**\n\n" + "\n".join(lines) + "\n"
 
 
 def speed_tables(base: Scenario, *, device: str, full: bool, progress: Progress) -> list[Table]:
@@ -56,9 +34,9 @@ def speed_tables(base: Scenario, *, device: str, full: bool, progress: Progress)
     scene = base.replaced(SHORT)
     tables = [_ratios(scene, device, progress), _kernels(scene, device, progress)]
     tables += [_sizes(base, device, full, progress), _domains(scene, device, progress), _drag(base, device, progress)]
-    tables += [_recording(base, device, progress)]
+    tables += [recording(base, device, progress)]
     if device == "cpu":
-        tables.append(_first_run(progress))
+        tables += [first_run(CASE, progress), several_at_once(base.replaced({"output.end_time_s": 4.0}), progress)]
     return tables
 
 
@@ -164,8 +142,10 @@ def _sizes(base: Scenario, device: str, full: bool, progress: Progress) -> Table
         small = Yardstick(11_472, device=device, clock=clock)
         yard, cost = in_turns([small, stepper], rounds=7, seconds=TURN)
         first = first or cost / yard
-        rows.append((f"{points:,}", f"{cost:.1f}", f"{cost / yard:.2f}", f"{cost / yard / first - 1.0:+.0%}"))
-    columns = ("points", "ns per point and step", "yardsticks", "against the first")
+        held = sum(stepper.simulation.arrays.values()) / points
+        costs = (f"{cost:.1f}", f"{cost / yard:.2f}", f"{cost / yard / first - 1.0:+.0%}")
+        rows.append((f"{points:,}", *costs, f"{held:.0f}"))
+    columns = ("points", "ns per point and step", "yardsticks", "against the first", "bytes per point, grid included")
     return Table("Cost against the number of points (yardstick of 11,472)", columns, rows)
 
 
@@ -198,62 +178,6 @@ def _drag(base: Scenario, device: str, progress: Progress) -> Table:
         rows.append((*row, f"{displacements[-1]:.4f} ({share:+.1%})"))
     columns = ("drag", "steps to t = 1.2 s", "greatest step [s]", "barrier displacement [m]")
     return Table("What semi-implicit drag saves, at 0.4 m", columns, rows)
-
-
-def _recording(base: Scenario, device: str, progress: Progress) -> Table:
-    progress("recording")
-    clock, scene = clock_of(device), base.replaced({"output.end_time_s": 2.0})
-    output, spent = scene.output, []
-    for recorded in (False, True):
-        simulation = Simulation(scene, device=device)
-        simulation.advance(1e-6)
-        with tempfile.TemporaryDirectory() as folder:
-            begin = clock()
-            if recorded:
-                series = TimeSeriesRecorder(Path(folder) / "series.csv", output.time_series_interval_s)
-                snapshots = SnapshotRecorder(
-                    Path(folder) / "snapshots.vtkhdf", output.snapshot_interval_s, output.end_time_s
-                )
-                record_until(simulation, [series, snapshots], output.end_time_s)
-                series.close()
-                snapshots.close()
-            else:
-                simulation.advance(output.end_time_s)
-            spent.append((clock() - begin, simulation.steps))
-    (plain, plain_steps), (whole, steps) = spent
-    # Landing on the records takes more steps, which are no fault of the recorders.
-    share = (whole - plain * steps / plain_steps) / whole
-    rows = [
-        ("in one go", f"{plain_steps:,}", f"{plain:.2f}", ""),
-        ("with time series and snapshots", f"{steps:,}", f"{whole:.2f}", f"{share:.1%}"),
-    ]
-    columns = ("case 1 at 0.2 m to t = 2 s", "steps", "time [s]", "share of recording and Python")
-    return Table("Recording", columns, rows)
-
-
-def _first_run(progress: Progress) -> Table:
-    """Time to the end of the first step in a new process, with and without kernels compiled before."""
-    progress("first run, kernels compiled from nothing")
-    code = (
-        "import sys, time; begin = time.perf_counter()\n"
-        "from warp_mpm import Scenario, Simulation\n"
-        "simulation = Simulation(Scenario.load(sys.argv[1])); simulation.advance(1e-4)\n"
-        "print(time.process_time(), time.perf_counter() - begin)"
-    )
-    scene = Scenario.load(CASE).resolved()
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "scene.json"
-        file.write_text(Scenario.model_validate(scene).model_dump_json())
-        environment = os.environ | {"WARP_CACHE_PATH": folder, "PYTHONPATH": str(CASE.parents[1])}
-        for name in ("compiled from nothing", "again"):
-            done = subprocess.run(
-                [sys.executable, "-c", code, str(file)], env=environment, capture_output=True, text=True, check=True
-            )
-            busy, wall = done.stdout.split()[-2:]
-            rows.append((name, f"{float(busy):.1f}", f"{float(wall):.1f}"))
-    columns = ("start of case 1, to its first step", "processor [s]", "on the wall [s]")
-    return Table("First run and later ones", columns, rows)
 
 
 CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"

@@ -22,6 +22,10 @@ from warp_mpm.recording.schedule import Schedule
 
 VTK_VERTEX = 1
 
+FILE_OPTIONS = {"libver": ("earliest", "v108"), "locking": False, "rdcc_nbytes": 0}
+"""Newer versions of the format mark a file that is open for writing, and a mark left by a killed process bars readers.
+Without a cache for chunks, numbers go to the file as they are written, not at some later flush."""
+
 FILLED = (
     "Points",
     "Offsets",
@@ -49,7 +53,6 @@ class SnapshotRecorder:
             FileExistsError: there is one already.
             RunFolderError: the file does not reach to the mark.
         """
-        # Newer file versions mark a file that is open for writing, and a mark left by a killed process bars readers.
         self.schedule = Schedule(interval)
         self._path = path
         self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
@@ -62,7 +65,7 @@ class SnapshotRecorder:
         self._filled: dict[str, h5py.Dataset] = {}
         self._buffers: dict[str, np.ndarray] = {}
         if mark is None:
-            self._file = h5py.File(path, "x", libver=("earliest", "v108"), locking=False)
+            self._file = h5py.File(path, "x", **FILE_OPTIONS)
             self._root = self._file.create_group("VTKHDF")
         else:
             self._reopen(mark)
@@ -71,7 +74,7 @@ class SnapshotRecorder:
         self.schedule.count = mark["records"]
         self._count, self._points = mark["snapshots"], mark["points"]
         try:
-            self._file = file = h5py.File(self._path, "r+", libver=("earliest", "v108"), locking=False)
+            self._file = file = h5py.File(self._path, "r+", **FILE_OPTIONS)
             self._root = root = file["VTKHDF"]
             self._steps = steps = root["Steps"]
             if min(len(steps["Values"]), int(steps.attrs["NSteps"])) < self._count:
@@ -145,7 +148,6 @@ class SnapshotRecorder:
         displacement = getattr(simulation, "barrier_displacement", None)
         shift = np.nan if displacement is None else displacement
         _fill(filled["FieldData/barrier_displacement"], step, np.array([shift]))
-        self._file.flush()
         # The count goes last: until it is written, a reader does not look at the new snapshot. VTK wants as many times
         # as steps, so their data set alone grows, inside the room that is set aside for it.
         self._count, self._points = step + 1, begin + number
