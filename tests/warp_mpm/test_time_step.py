@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from warp_mpm.time_step import biot_wave_speeds, explicit_drag_step, step_limits, undrained_wave_speed
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+from warp_mpm.time_step import (
+    biot_wave_speeds,
+    explicit_drag_step,
+    lone_point_courant_number,
+    step_limits,
+    undrained_wave_speed,
+)
 
 SPACING, GRAIN, LIQUID, GRAVITY = 0.2, 2600.0, 1000.0, 9.81
 
@@ -88,3 +96,48 @@ def test_limits_of_the_scenes(load_scene):
     # Linear viscosity on the mode of omega = 2 c / d, lagged by one step: s dt^2 omega^2 + 2 b dt omega = 4 at most.
     reached = SPACING / implicit.wave_speed * implicit.sound_speed / SPACING
     assert reached**2 + 2.0 * b * reached == pytest.approx(1.0, rel=1e-12)
+
+
+def growth_of_a_lone_point(load_scene, transfer, place, step):
+    """By what factor the stress of one elastic point grows in 200 steps of c dt / d = `step`, from 1 Pa."""
+    corners = [[-2.0, 2.0], [-1.75, 2.0], [-1.75, 2.25], [-2.0, 2.25]]
+    data = load_scene("case_1_dry").resolved()
+    data |= {"barrier": None, "ground": None, "gravity": {"acceleration_m_per_s2": 0.0}}
+    data["flow"] |= {
+        "shape": {"kind": "polygon", "vertices_m": corners},
+        "velocity_m_per_s": [0.0, 0.0],
+        "initial_stress": "zero",
+    }
+    data["flow"]["material"]["plasticity"] = False
+    data["numerics"] |= {"spacing_m": 0.25, "points_per_cell": 1, "transfer": transfer, "bulk_viscosity": 0.0}
+    data["numerics"]["courant_number"] = step
+    scenario = Scenario.model_validate(data)
+    simulation = Simulation(scenario)
+    sound = step_limits(scenario).sound_speed
+    simulation._parameters.wave_speed = sound  # the step of a full grid
+    simulation._point_arrays["position"].assign(np.array([[-2.0 + 0.25 * place, 2.0 + 0.25 * place]]))
+    simulation.set_points(effective_stress=np.array([[1.0, 1.0, 0.0, 0.0]]))
+    simulation.advance(200 * step * 0.25 / sound)
+    return np.abs(simulation.points()["effective_stress"]).max()
+
+
+@pytest.mark.parametrize("transfer", ["apic", "flip"])
+@pytest.mark.parametrize("place", [0.5, 0.7, 0.95])
+def test_limit_of_a_lone_point(load_scene, transfer, place):
+    """Just below the limit that its place in the cell gives it does not grow, just above it does."""
+    slopes = 4.0 + (1.0 - 2.0 * place) ** 2 / (0.5 + place - place**2)
+    limit = lone_point_courant_number(0.25, transfer, slopes)
+    assert growth_of_a_lone_point(load_scene, transfer, place, 0.97 * limit) < 10.0
+    assert growth_of_a_lone_point(load_scene, transfer, place, 1.05 * limit) > 1e3
+    assert limit >= lone_point_courant_number(0.25, transfer)
+
+
+def test_lone_points_count_where_there_is_tension(load_scene):
+    """An elastic flow takes the step that a lone point bears; one without tension is not slowed by it."""
+    plain = step_limits(load_scene("case_1_dry"))
+    elastic = step_limits(load_scene("case_1_dry", **{"flow.material.plasticity": False}))
+    cohesive = {"flow.material.cohesion_Pa": 1e4, "flow.material.tension_cutoff_Pa": 5e3}
+    assert elastic.wave_speed == pytest.approx(plain.wave_speed / lone_point_courant_number(0.25, "apic"), rel=1e-12)
+    assert step_limits(load_scene("case_1_dry", **cohesive)) == elastic
+    wet = step_limits(load_scene("case_1", **{"flow.material.cavitation_pressure_Pa": 1e5}))
+    assert wet.wave_speed == pytest.approx(2.0 * step_limits(load_scene("case_1")).wave_speed, rel=1e-12)
