@@ -70,6 +70,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
 def _numerical_rules(scenario: Scenario) -> list[Rule]:
     numerics = scenario.numerics
     liquid = not isinstance(scenario.flow, DryFlow)
+    corrected = numerics.density_correction > 0.0 and numerics.volumetric_smoothing
     relaxation = f"numerics.pressure_relaxation = {numerics.pressure_relaxation:g}"
     return [
         Rule(
@@ -83,6 +84,14 @@ def _numerical_rules(scenario: Scenario) -> list[Rule]:
             numerics.volumetric_smoothing,
             _setting("numerics.volumetric_smoothing", numerics.volumetric_smoothing),
             {"numerics.volumetric_smoothing": not numerics.volumetric_smoothing},
+        ),
+        Rule(
+            "density_correction",
+            corrected,
+            f"numerics.density_correction = {numerics.density_correction:g}"
+            if numerics.volumetric_smoothing
+            else "numerics.volumetric_smoothing = false",
+            {"numerics.density_correction": 0.0 if corrected else 1.0} if numerics.volumetric_smoothing else {},
         ),
         Rule(
             "pressure_relaxation",

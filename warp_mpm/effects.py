@@ -21,6 +21,8 @@ class Effects:
     """Mohr-Coulomb with tension cut-off; off: linear elastic."""
     volumetric_smoothing: bool = True
     """Volume strain rates averaged over the cells' corners (anti-locking)."""
+    density_correction: bool = False
+    """Points that crowd beyond the room there is are compressed, so that pressure makes them spread again."""
     pressure_relaxation: bool = True
     """Excess pore pressure drawn toward its grid projection at a given rate."""
     bulk_viscosity: bool = False
@@ -78,6 +80,7 @@ class Effects:
             for name in (
                 "plasticity",
                 "volumetric_smoothing",
+                "density_correction",
                 "pressure_relaxation",
                 "porosity_update",
                 "barrier_friction",

@@ -180,9 +180,12 @@ def contact_nodes(barrier: Barrier, grid: GridLayout, depth_in_cells: float = 4.
     return ContactNodes(node, mirror, normal, surface, friction[surface])
 
 
-def open_corner_volumes(scenario: Scenario, grid: GridLayout) -> NDArray[np.float64]:
+def open_corner_volumes(scenario: Scenario, grid: GridLayout, depth_in_cells: float = 0.0) -> NDArray[np.float64]:
     """Volume [columns, rows] of the cell around each corner of the grid that is open to flow [m3/m], at least an
-    eighth of a cell. Sampled at 8 x 8 places where a solid is near."""
+    eighth of a cell. Sampled at 8 x 8 places where a solid is near.
+
+    Faces that do not lie along the grid count as `depth_in_cells` further back: points rest that deep in them.
+    """
     spacing = grid.spacing
     x = grid.left + (np.arange(grid.columns) + 1.0) * spacing
     y = grid.bottom + (np.arange(grid.rows) + 1.0) * spacing
@@ -190,7 +193,10 @@ def open_corner_volumes(scenario: Scenario, grid: GridLayout) -> NDArray[np.floa
     if scenario.ground is not None:
         share *= np.clip(y / spacing + 0.5, 0.0, 1.0)[None, :]
     if scenario.barrier is not None:
-        planes = barrier_planes(scenario.barrier)
+        planes = [
+            (surface, (nx, ny), offset - (depth_in_cells * spacing if nx and ny else 0.0))
+            for surface, (nx, ny), offset in barrier_planes(scenario.barrier)
+        ]
         offsets = (np.arange(8) + 0.5) / 8.0 - 0.5
         low = np.full((grid.columns, grid.rows), -np.inf)
         for _, (nx, ny), offset in planes:

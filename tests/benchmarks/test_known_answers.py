@@ -5,9 +5,6 @@ import pytest
 from warp_mpm.validation.catalogue import CASES
 
 KNOWN_SHORT = {
-    # Points crowd where the flow turns sharply and stays (docs/validation.md): part of the momentum stays behind.
-    "jet": ("vertical, deflector and ground", "error of F_y"),
-    "bore": ("speed of the bore",),
     # A skeleton without rate dependence runs out too far when it falls from high.
     "collapse": ("a = 4: run-out", "a = 2: run-out"),
 }

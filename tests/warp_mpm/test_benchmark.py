@@ -49,9 +49,9 @@ def test_the_ladder_adds_one_effect_at_a_time(load_scene):
     rules = [{rule.effect: rule.value for rule in effect_rules(scene)} for _, scene in scenes]
     changed = [{name for name in after if after[name] != before[name]} for before, after in pairwise(rules)]
     # The second phase brings the drag along; all others are one effect.
-    assert [len(names) for names in changed] == [1] * 8 + [2] + [1] * 4
-    assert changed[8] == {"formulation", "drag"}
-    assert len(scenes) == 14
+    assert [len(names) for names in changed] == [1] * 9 + [2] + [1] * 4
+    assert changed[9] == {"formulation", "drag"}
+    assert len(scenes) == 15
 
 
 def test_cost_follows_the_points_and_not_the_domain(load_scene):

@@ -21,7 +21,7 @@ BARRIERS = {"sliding": ["collect", "slide", "barrier"], "fixed": ["collect", "ba
 
 POINT_NUMBERS = {
     "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
-            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1},
+            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1, "crowding": 1},
 }  # fmt: skip
 POINT_NUMBERS["undrained"] = POINT_NUMBERS["dry"] | {"liquid_strain": 1, "pressure_residual": 1}
 POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
@@ -29,8 +29,9 @@ POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
 }  # fmt: skip
 """Floating-point numbers that a material point holds, by formulation."""
 
-NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2 + 1, "undrained": 1 + 2 + 2 + 4 + 1 + 2, "two_phase": 1 + 4 + 4 + 5 + 1}
-"""And a node: mass, momentum, velocity, corner sums, corner room; undrained friction needs the water's own share."""
+NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2 + 2, "undrained": 1 + 2 + 2 + 4 + 2 + 2, "two_phase": 1 + 4 + 4 + 5 + 2}
+"""And a node: mass, momentum, velocity, corner sums, corner room (twice); undrained friction needs the water's own
+share."""
 
 LIQUID_WORDS = ("liquid", "pore", "pressure_residual", "drag", "surrounded", "cavitation", "relaxation")
 

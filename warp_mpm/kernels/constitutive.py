@@ -102,6 +102,7 @@ def make_constitutive(
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
+    DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.barrier in ("sliding", "driven")
     GAP_BOUND = effects.gap_record and effects.smoothing_grid
@@ -169,6 +170,16 @@ def make_constitutive(
                 n = porosity(points.reference_volume[p], points.volume[p], parameters)
                 mixture = (F(1.0) - n) * divergence + n * liquid_divergence
             points.viscous_pressure[p] = -parameters.bulk_viscosity * wp.min(mixture, F(0.0))
+
+        if DENSITY:
+            # What the points around claim over what there is; a flow that is compressed claims less.
+            stretch = gradient[0] - gradient[3]
+            shear = gradient[1] + gradient[2]
+            ratio = filling * points.volume[p] / points.reference_volume[p]
+            now = wp.log(wp.clamp(ratio, F(0.5), F(2.0)))
+            crowding = points.crowding[p]
+            share = wp.min(time_step * wp.sqrt(stretch * stretch + shear * shear), F(1.0))
+            points.crowding[p] = crowding + share * (now - crowding)
 
         volume_strain = divergence * time_step
         borne = volume_strain

@@ -142,6 +142,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["solid_gap"] = array(dtype=scalar)
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
+    if effects.density_correction:
+        points["crowding"] = array(dtype=scalar)  # log of volume over room, a mean over the last unit of shear strain
     if effects.pressure_relaxation:
         points["pressure_residual"] = array(dtype=scalar)
         points["surrounded"] = array(dtype=wp.int32)  # 1: the corners around are filled, so that the filter acts
@@ -169,6 +171,9 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
+    if effects.density_correction:
+        # The same with half a cell more in front of an inclined face, where points come to rest.
+        grid["corner_space"] = array(dtype=scalar, ndim=2)
 
     parameters: dict[str, Any] = {
         "spacing": scalar,
@@ -190,6 +195,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "largest_stable_step": wp.float64,
         "pic_rate": scalar,
     }
+    if effects.density_correction:
+        parameters["density_correction"] = scalar  # share of the crowding undone per unit of shear strain
     if effects.bulk_viscosity:
         parameters["bulk_viscosity"] = scalar  # pressure per rate of compression [Pa s]
     if effects.plasticity:

@@ -11,6 +11,9 @@ from .layout import (
     TIME_STEP,
 )
 
+EVEN = 0.1
+"""Log of a filling up to which points are not crowded: an even arrangement varies by that as it crosses the grid."""
+
 
 def make_transfer(
     types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
@@ -35,6 +38,7 @@ def make_transfer(
     FLIP = effects.transfer == "flip"
     APIC = effects.transfer == "apic"
     CORNERS = effects.smoothing_grid
+    DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
@@ -281,6 +285,18 @@ def make_transfer(
         if TWO_PHASE:
             liquid_divergence = along_x[2] + along_y[3]
             points.liquid_divergence[p] = liquid_divergence
+        if DENSITY:
+            # Beyond what a regular arrangement of points varies by, crowding counts as compression (of both phases), at
+            # the rate of the shearing that brings it about; the corners' averages keep the pressures smooth.
+            stretch = along_x[0] - along_y[1]
+            shear = along_y[0] + along_x[1]
+            squeeze = (
+                parameters.density_correction
+                * wp.sqrt(stretch * stretch + shear * shear)
+                * wp.max(points.crowding[p] - F(wp.static(EVEN)), F(0.0))
+            )
+            divergence -= squeeze
+            liquid_divergence -= squeeze
         if CORNERS:
             hx = hats(fx)
             hy = hats(fy)
@@ -324,7 +340,11 @@ def make_transfer(
                     corner = grid.corner[i, j]
                     if corner[0] > F(0.0):
                         mean = corner / corner[0]
-                        mean[0] = corner[0] * grid.corner_room[i, j]
+                        filling = corner[0] * grid.corner_room[i, j]
+                        if DENSITY:
+                            # Up to one as everywhere; beyond one, crowding, which needs the room behind inclined faces.
+                            filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
+                        mean[0] = filling
                         grid.corner[i, j] = mean
 
         kernels.average = average

@@ -63,12 +63,13 @@ def _ladder(full: Scenario) -> list[tuple[str, Scenario]]:
     fixed = barrier | {"motion": {"kind": "fixed"}, "friction": 0.0}
     nothing: dict[str, Any] = {
         "barrier": None, "flow.material.plasticity": False, "numerics.volumetric_smoothing": False,
-        "numerics.bulk_viscosity": 0.0,
+        "numerics.density_correction": 0.0, "numerics.bulk_viscosity": 0.0,
     }  # fmt: skip
     steps: list[tuple[str, dict[str, Any]]] = [
         ("dry, elastic, smooth ground", {}),
         ("plasticity", {"flow.material.plasticity": True}),
         ("volumetric smoothing", {"numerics.volumetric_smoothing": True}),
+        ("density correction", {"numerics.density_correction": full.numerics.density_correction or 1.0}),
         ("bulk viscosity", {"numerics.bulk_viscosity": full.numerics.bulk_viscosity or 0.2}),
         ("fixed barrier", {"barrier": fixed}),
         ("barrier friction", {"barrier": fixed | {"friction": barrier["friction"]}}),

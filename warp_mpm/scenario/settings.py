@@ -69,6 +69,9 @@ class Numerics(Model):
     """How the drag between the phases is integrated; explicit limits the time step at low conductivity."""
     volumetric_smoothing: bool = True
     """Volume strains are averaged over the grid, against volumetric locking."""
+    density_correction: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
+    """Share of the crowding of points (cells that hold more than there is room for, where a flow is stirred) that is
+    undone per unit of shear strain; 0 lets it grow. Needs volumetric_smoothing."""
     pressure_relaxation: NonNegative = 1.0
     """Rate at which the noise of point pressures about their grid average decays, per sound crossing of a cell [-]."""
     bulk_viscosity: Annotated[float, Field(ge=0.0, le=2.0)] = 0.2

@@ -60,7 +60,11 @@ def grid_arrays(
     blocks = (grid.columns // at.BLOCK, grid.rows // at.BLOCK)
     shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.columns, grid.rows))
     shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1}
-    given = {"corner_room": 1.0 / open_corner_volumes(scenario, grid)} if effects.smoothing_grid else {}
+    given = {}
+    if effects.smoothing_grid:
+        given["corner_room"] = 1.0 / open_corner_volumes(scenario, grid)
+    if effects.density_correction:
+        given["corner_space"] = 1.0 / open_corner_volumes(scenario, grid, depth_in_cells=0.5)
     return _filled(types.Grid(), types.grid_fields, given, shapes, device)
 
 

@@ -79,6 +79,8 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
             cohesion=material.cohesion_Pa,
             tension_cutoff=material.tension_cutoff_Pa,
         )
+    if effects.density_correction:
+        values["density_correction"] = numerics.density_correction
     if effects.bulk_viscosity:
         values["bulk_viscosity"] = numerics.bulk_viscosity * material.density * limits.sound_speed * numerics.spacing_m
     return values

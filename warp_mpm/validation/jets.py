@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ PLATEAU = 6.0, 12.0
 """Time v t / h from which on the flow in the corner is steady, and until which the jet's tail has no effect."""
 
 
-def _jet(angle: float, spacing: float) -> tuple[Array, Array, Array]:
+def jet_forces(angle: float, spacing: float, **numerics: Any) -> tuple[Array, Array, Array]:
     """Time v t / h, horizontal force on the deflector and vertical force on it and the ground, over ρ h v²."""
     shape = {"kind": "trapezoid", "height_m": 8.0, "crest_width_m": 1.0, "face_angle_deg": angle}
     front = [[-LENGTH, 0.0], [-0.5, 0.0], [-0.5 - DEPTH, DEPTH], [-LENGTH, DEPTH]]
@@ -33,6 +34,7 @@ def _jet(angle: float, spacing: float) -> tuple[Array, Array, Array]:
             soil=INVISCID,
             barrier=fixed({"kind": "wall"} if angle == 90.0 else shape),
             spacing_m=spacing,
+            **numerics,
             domain={"top_m": 16.0},
         )
     )
@@ -60,7 +62,7 @@ def jets(quick: bool) -> Outcome:
         errors: dict[str, list[float]] = {name: [] for name in exact}
         curves = []
         for spacing, style in zip(spacings, (":", "--", "-")[-len(spacings) :], strict=True):
-            time, *forces = _jet(angle, spacing)
+            time, *forces = jet_forces(angle, spacing)
             steady = (time > PLATEAU[0]) & (time <= PLATEAU[1])
             for name, force in zip(exact, forces, strict=True):
                 mean = float(force[steady].mean())
