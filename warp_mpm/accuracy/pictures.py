@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
@@ -20,6 +20,9 @@ from warp_mpm.plotting.style import BLUE, GREY, ORANGE, RUN_COLOURS, grid
 
 LEAST_ERROR = 1e-4
 """Errors below are drawn here: less than any reference is known to."""
+
+SHOWN_BELOW_DOUBT = 5.0
+"""How far the panels go on below what the reference is known to; what is less is drawn on the lower edge."""
 
 MARKERS = "osD^v<>P"
 
@@ -51,39 +54,41 @@ def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
 
 def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula]) -> None:
     knobs = [DEFAULT, *(knob for knob in KNOBS if any(row.setting.knob == knob for row in study.rows))]
+    doubt = study.doubt(name)
+    least = max(LEAST_ERROR, doubt / SHOWN_BELOW_DOUBT)
     for number, knob in enumerate(knobs):
         rows = [r for r in study.rows if r.setting.knob == knob and math.isfinite(error_of(r, name))]
         panel.plot(
             [row.time for row in rows],
-            [_drawn(error_of(row, name)) for row in rows],
+            [_drawn(error_of(row, name), least) for row in rows],
             MARKERS[number % len(MARKERS)],
             color=RUN_COLOURS[number % len(RUN_COLOURS)],
             markersize=6 if knob == DEFAULT else 4.5,
             markerfacecolor=None if knob == DEFAULT else "none",
-            label="spacing alone" if knob == DEFAULT else knob,
+            label="spacing alone [m]" if knob == DEFAULT else knob.replace("_", " "),
         )
     best = study.fronts[name]
     panel.plot(
-        [r.time for r in best], [_drawn(error_of(r, name)) for r in best], "-", color=GREY, linewidth=1.2, zorder=1
-    )
+        [r.time for r in best], [_drawn(error_of(r, name), least) for r in best], "o-", color=GREY, linewidth=1.2,
+        markersize=11, markerfacecolor="none", zorder=1, label="cheapest choices",
+    )  # fmt: skip
     for row in study.rows:
         if row.setting.knob == DEFAULT and row.errors:
             panel.annotate(
-                f"{row.setting.spacing:g}", (row.time, _drawn(error_of(row, name))), fontsize=7, color=BLUE,
+                f"{row.setting.spacing:.3g}", (row.time, _drawn(error_of(row, name), least)), fontsize=7, color=BLUE,
                 xytext=(3, 4), textcoords="offset points",
             )  # fmt: skip
     for number, formula in enumerate(found):
         error = formula_errors(study, formula).get(name)
         if error is not None:
             panel.plot(
-                formula.time, _drawn(abs(error)), ("*", "P", "X", "p", "h", "d", "8")[number % 7],
+                formula.time, _drawn(abs(error), least), ("*", "P", "X", "p", "h", "d", "8")[number % 7],
                 color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
             )  # fmt: skip
-    doubt = study.doubt(name)
-    panel.axhspan(LEAST_ERROR / 2, max(doubt, LEAST_ERROR), color="#EEEEEE", zorder=0)
-    _logarithmic(panel)
+    panel.axhspan(least / 2, max(doubt, least), color="#EEEEEE", zorder=0)
+    _logarithmic(panel, least)
     panel.set_title(_title(name), fontsize=9)
-    panel.set_xlabel("CPU time [s]", fontsize=8)
+    panel.set_xlabel("CPU time", fontsize=8)
     panel.set_ylabel("error (grey: reference unsure)", fontsize=8)
 
 
@@ -110,8 +115,8 @@ def error_of_each_knob(study: Study) -> Figure:
             spacings, [_drawn(error_of(row, name)) for row in ladder], "o-", color=RUN_COLOURS[number], linewidth=1.0,
             markersize=4, label=f"{QUANTITIES[name].label}{order}",
         )  # fmt: skip
-    _logarithmic(panels[0])
-    panels[0].set_xticks(spacings, [f"{value:g}" for value in spacings])
+    _logarithmic(panels[0], times=False)
+    panels[0].set_xticks(spacings, [f"{value:.3g}" for value in spacings])
     panels[0].minorticks_off()
     panels[0].set_xlabel("spacing [m]")
     panels[0].set_ylabel("error")
@@ -132,10 +137,16 @@ def error_of_each_knob(study: Study) -> Figure:
             color=[BLUE if level == own else GREY for level, _, _ in points],
         )
         texts = [f"{ratio:.2g}× time" if math.isfinite(value) else "diverged" for _, value, ratio in points]
-        panel.bar_label(bars, texts, fontsize=8)
+        panel.bar_label(
+            bars,
+            texts,
+            fontsize=8,
+            padding=2,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85},
+        )
         panel.axhline(100.0 * study.doubt("overall"), color=ORANGE, linewidth=1.0, linestyle="--")
-        panel.set_xticks(places, [level_text(level) for level, _, _ in points])
-        panel.set_title(f"{knob} (blue: the scenario's own)", fontsize=9)
+        panel.set_xticks(places, [level_text(level).replace("_", "-") for level, _, _ in points])
+        panel.set_title(f"{knob.replace('_', ' ')} (blue: the scenario's own)", fontsize=9)
         panel.set_ylabel("error of the key figures [%]", fontsize=8)
         panel.margins(y=0.18)
     return figure
@@ -157,7 +168,7 @@ def where_time_goes(study: Study) -> Figure:
         values = np.array([row.result[name] for row in ladder])
         times.bar(places, values, bottom=below, color=colour, label=label)
         below += values
-    times.set_xticks(places, [f"{row.setting.spacing:g}" for row in ladder])
+    times.set_xticks(places, [f"{row.setting.spacing:.3g}" for row in ladder])
     times.set_xlabel("spacing [m]")
     times.set_ylabel("CPU time [s]")
     times.legend(fontsize=8)
@@ -204,7 +215,7 @@ def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]])
                 )  # fmt: skip
         _logarithmic(panel)
         panel.set_title(_title(name), fontsize=10)
-        panel.set_xlabel("CPU time [s]")
+        panel.set_xlabel("CPU time")
         panel.set_ylabel("error")
     handles: dict[str, Any] = {}
     for panel in figure.axes:
@@ -217,17 +228,32 @@ def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]])
     return figure
 
 
-def _drawn(error: float) -> float:
-    return max(error, LEAST_ERROR)
+def _drawn(error: float, least: float = LEAST_ERROR) -> float:
+    return max(error, least)
 
 
-def _logarithmic(panel: Axes) -> None:
+def _logarithmic(panel: Axes, least: float = LEAST_ERROR, *, times: bool = True) -> None:
     panel.set_xscale("log")
     panel.set_yscale("log")
-    panel.set_ylim(bottom=LEAST_ERROR / 1.5)
+    panel.set_ylim(bottom=least / 1.5)
+    low, high = panel.get_ylim()
+    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high / low < 1e4 else (1.0,), numticks=20))
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g} %"))
+    panel.yaxis.set_minor_formatter(NullFormatter())
+    if times:
+        low, high = panel.get_xlim()
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high / low < 1e3 else (1.0,), numticks=20))
+        panel.xaxis.set_major_formatter(FuncFormatter(_time_text))
+        panel.xaxis.set_minor_formatter(NullFormatter())
     panel.tick_params(labelsize=8)
     grid(panel)
+
+
+def _time_text(seconds: float, _: Any = None) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= 0.1 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} µs"
 
 
 def _title(name: str) -> str:

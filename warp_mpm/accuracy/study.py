@@ -47,6 +47,7 @@ SPACING, DEFAULT = "spacing_m", "default"
 
 _KERNELS = (
     "kernels/*.py",
+    "state/*.py",
     "simulation.py",
     "discretization.py",
     "geometry.py",

@@ -80,7 +80,7 @@ def accuracy(
 
         changes = {} if until is None else {"output.end_time_s": until}
         scenes = [Scenario.load(path).replaced(changes) for path in scenarios]
-        name = scenarios[0].stem if len(scenes) == 1 else "ladders"
+        name = "check" if check else scenarios[0].stem if len(scenes) == 1 else "ladders"
         folder = out if out is not None else Path("runs/accuracy") / name
         if page is not None:
             place_in(page, folder.name)
