@@ -205,7 +205,7 @@ class Simulation:
 
     def _sum_up(self) -> None:
         self._sums.zero_()
-        self._launch("ledger", self.material_points, self._points, self._parameters, self._clock, self._sums)
+        self._launch("ledger", self._workers, self._points, self._parameters, self._clock, self._sums)
 
     def _prepare(self) -> None:
         """Compile the kernels and capture an interval, once."""
