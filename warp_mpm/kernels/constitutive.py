@@ -246,6 +246,10 @@ def make_constitutive(
         else:
             v = points.velocity[p]
             x += time_step * V2(v[0], v[1])
+        # Barrier and grid as they will lie in the next step: whatever their speed, no point then reaches beyond them.
+        if MOVING:
+            middle = F(0.5) * (F(clock[wp.static(BARRIER_VELOCITY)]) + F(clock[wp.static(OLD_BARRIER_VELOCITY)]))
+            shift += time_step * middle
         depth = F(-0.5) * parameters.spacing
         if GROUND:
             if x[1] < depth:
@@ -266,10 +270,6 @@ def make_constitutive(
                     x += (depth - back) * parameters.back_normal
         points.position[p] = x
 
-        # The grid as it will lie in the next step: whatever a barrier's speed, no point then reaches beyond it.
-        if MOVING:
-            middle = F(0.5) * (F(clock[wp.static(BARRIER_VELOCITY)]) + F(clock[wp.static(OLD_BARRIER_VELOCITY)]))
-            shift += time_step * middle
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         margin = F(2.0)
