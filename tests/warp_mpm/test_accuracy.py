@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from warp_mpm.accuracy.check import Check, drawn, holds, table
-from warp_mpm.accuracy.errors import errors, extrapolate, references
+from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.purchase import (
     PurchaseError,
@@ -64,7 +64,7 @@ def made_up(scenario: Scenario, *, order: float = 1.0, wobble: float = 0.0) -> d
             "peak_force_time": 0.5,
             "barrier_displacement_final": 1.3 * (1 + off),
             "pore_pressure_max": 1e5 * (1 + off),
-            "overtopped_volume": 4.0,
+            "overtopped_volume": 4.0 * (1 + off),
         },
         "curves": {
             "time": time,
@@ -90,6 +90,12 @@ class TestExtrapolation:
         assert reference.order is None
         assert reference.value == 1.1
         assert reference.uncertainty == pytest.approx(0.3)  # spread of the three finest: 0.9 to 1.2
+
+    def test_order_amid_scatter_is_not_believed(self) -> None:
+        # The best fit has order 0.83, but leaves most of what varies.
+        reference = extrapolate([0.4, 0.3, 0.2, 0.15], [1.1, 1.2, 0.98, 1.06])
+        assert reference.order is None
+        assert reference.value == 1.06
 
     def test_uncertainty_covers_the_truth_in_nine_ladders_of_ten(self) -> None:
         random = np.random.default_rng(7)
@@ -146,6 +152,8 @@ class TestVerdict:
         # The law's error at spacing h is 0.1 h; the search for the order ends within 0.01.
         assert ladder_rows[0.8].errors["peak_force"] == pytest.approx(0.08, abs=1e-3)
         assert study.references.scalars["peak_force"].value == pytest.approx(4e5, rel=1e-3)
+        # An error of a volume is relative to the flow's, 45 m3/m; made up are 4 m3/m overtopped.
+        assert ladder_rows[0.8].errors["overtopped_volume"] == pytest.approx(0.08 * 4.0 / 45.0, abs=1e-4)
         price = study.price("peak_force", 0.05)
         assert price is not None
         assert (price.setting.knob, price.setting.spacing) == (DEFAULT, 0.4)
@@ -160,6 +168,14 @@ class TestVerdict:
         assert one_point.verdict.startswith("less accurate")
         many = next(k for k in study.knobs if (k.name, k.level) == ("points_per_cell", 16))
         assert many.verdict == "buys nothing"
+
+    def test_worst_key_figure_counts(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        known = references(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        wrong = {"peak_force": 0.01, "impulse": -0.05, "barrier_displacement_final": 0.02, "pore_pressure_max": 0.9}
+        assert overall(wrong, known) == 0.05
+        del wrong["impulse"]
+        assert math.isinf(overall(wrong, known))
 
     def test_error_that_cancels_once_buys_nothing(self, scene: Scenario) -> None:
         settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
