@@ -178,15 +178,34 @@ class TestVerdict:
         assert math.isinf(overall(wrong, known))
 
     def test_error_that_cancels_once_buys_nothing(self, scene: Scenario) -> None:
-        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
-        # Exact on the coarsest grid by accident, wrong by several per cent on the others.
-        results = {s.key: made_up(s.scenario, wobble=-0.08 if s.spacing == 0.8 else 0.0) for s in settings}
+        # Right on the coarsest grid by accident, 9 % off on the next, then within the 1 % of the finest three's spread.
+        off = {1.6: 0.0, 0.8: 0.10, 0.6: 0.01, 0.4: 0.0, 0.3: 0.005}
+        settings = ladder(scene, list(off))
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=off[s.spacing]) for s in settings}
         study = evaluate(scene, settings, results)
-        price = study.price("peak_force", 0.1)
-        assert price is None or price.setting.spacing < 0.8 or study.doubt("peak_force") <= 0.1
-        cheapest = front(study.rows, "peak_force")[0]
-        assert cheapest.setting.spacing == 0.8  # it is on the front all the same
-        assert study.price("peak_force", 0.005) is None
+        assert front(study.rows, "peak_force")[0].setting.spacing == 1.6  # it is on the front all the same
+        price = study.price("peak_force", 0.05)
+        assert price is not None
+        assert price.setting.spacing == 0.6
+
+    def test_nothing_is_sold_below_what_the_reference_is_known_to(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        # The finest is off by 3 %, and the limit beyond it known to 1.25 times that.
+        finest = study.price("peak_force", 0.039)
+        assert finest is not None
+        assert finest.setting.spacing == 0.3
+        assert study.price("peak_force", 0.035) is None
+
+    def test_setting_without_a_ladder_is_not_sold(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        results = {s.key: made_up(s.scenario) for s in settings}
+        single = next(s for s in settings if s.knob == "bulk_viscosity")
+        lucky = made_up(single.scenario, wobble=-0.1 * single.spacing)  # no error at all, at one spacing
+        results[single.key] = lucky | {"cpu_time": 1e-3}
+        price = evaluate(scene, settings, results).price("peak_force", 0.05)
+        assert price is not None
+        assert price.setting.knob == DEFAULT
 
     def test_run_that_diverged_has_no_error_and_stops_nothing(self, scene: Scenario) -> None:
         settings = plan(scene, quick=True)
