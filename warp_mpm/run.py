@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from warp_mpm import plotting
 from warp_mpm.recording import (
     Checkpointer,
     Recorder,
@@ -234,6 +233,8 @@ def evaluate(path: Path) -> dict[str, Any]:
     Raises:
         ResultsError: the records cannot be read.
     """
+    from warp_mpm import plotting  # a third of a second, which the first step does not wait for
+
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
     taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")

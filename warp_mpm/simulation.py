@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from .discretization import material_points
+from .discretization import MaterialPoints, material_points
 from .effect_rules import derive_effects
 from .grid import fit_grid
 from .kernels import layout as at
@@ -101,9 +101,10 @@ class Simulation:
         self._parameters = kernel_parameters(
             scenario, self.effects, self._types, grid=self.grid, limits=self._limits, workers=self._workers
         )
-        self._initial = material_points(scenario)
-        self.material_points = len(self._initial.volume)
-        self._make_arrays()
+        initial = material_points(scenario)
+        self.material_points = len(initial.volume)
+        self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
+        self._make_arrays(initial)
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -113,13 +114,13 @@ class Simulation:
         weight = -mass * scenario.gravity.vector[1] if mass is not None else None
         self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
         self._last = self._totals()
-        flow_mass = float(self._initial.solid_mass.sum() + self._initial.liquid_mass.sum())
+        flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
-    def _make_arrays(self) -> None:
+    def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
         bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
-        points = point_arrays(scenario, effects, types, self._initial, liquid_bulk_modulus=bulk_modulus, device=device)
+        points = point_arrays(scenario, effects, types, initial, liquid_bulk_modulus=bulk_modulus, device=device)
         self._points, self._point_arrays = points.structure, points.arrays
         grid = grid_arrays(scenario, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
@@ -128,7 +129,7 @@ class Simulation:
             contact = contact_arrays(scenario.barrier, types, self.grid, device=device)
             self._contact, self._contact_arrays = contact.structure, contact.arrays
             self._contact_count = len(contact.arrays["node"])
-        self._clock_arrays = clock_arrays(scenario, effects, self._initial, device=device)
+        self._clock_arrays = clock_arrays(scenario, effects, initial, device=device)
         self._clock = self._clock_arrays["clock"]
         self._counters = self._clock_arrays["counters"]
         self._running = self._clock_arrays["running"]
@@ -384,8 +385,8 @@ class Simulation:
             "effective_stress": arrays["stress"],
             "deviatoric_strain": arrays["deviatoric_strain"],
             "volume": np.maximum(arrays["volume"], (1.0 - material.porosity) * arrays["reference_volume"]),
-            "solid_mass": self._initial.solid_mass[inside],
-            "liquid_mass": self._initial.liquid_mass[inside],
+            "solid_mass": self._solid_mass[inside],
+            "liquid_mass": self._liquid_mass[inside],
         }
         state["porosity"] = np.full(len(arrays["volume"]), material.porosity)
         if self.effects.porosity_update:

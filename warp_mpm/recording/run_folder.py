@@ -141,8 +141,8 @@ class RunFolder:
         """Write a JSON file whole or not at all. A number that is none (NaN) or has no end is written as null."""
         self.write_bytes(name, _text(content).encode())
 
-    def write_bytes(self, name: str, content: bytes) -> None:
-        """Write a file whole or not at all.
+    def write_bytes(self, name: str, *content: bytes) -> None:
+        """Write a file, given in pieces, whole or not at all.
 
         Raises:
             OSError: it could not be written; what was there before is there still.
@@ -151,7 +151,7 @@ class RunFolder:
         aside = target.with_name(name + ASIDE)
         try:
             with aside.open("wb") as file:
-                file.write(content)
+                file.writelines(content)
                 file.flush()
                 os.fsync(file.fileno())
             aside.replace(target)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 def packed(state: Mapping[str, NDArray[Any]]) -> bytes:
     """The arrays as bytes, bit for bit."""
-    return _listed(state) + b"\n" + b"".join(values.tobytes() for values in state.values())
+    # Joined from the arrays' own memory: a state may fill half of what there is.
+    return b"".join([_listed(state), b"\n", *(np.ascontiguousarray(values).data for values in state.values())])
 
 
 def unpacked(data: bytes, like: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
