@@ -9,7 +9,7 @@ from warp_mpm.effect_rules import effect_rules
 from warp_mpm.performance.benchmark import SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
-from warp_mpm.performance.table import Table
+from warp_mpm.performance.table import Table, put_into_page
 from warp_mpm.performance.whole_runs import recording_shares
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.plotting import save
@@ -69,8 +69,8 @@ def test_cost_follows_the_points_and_not_the_domain(load_scene):
 
 
 def test_tables_and_chart(tmp_path):
-    table = Table("Cost", ("scene", "ratio"), [("dry", "4.3"), ("two-phase", "5.3")])
-    assert table.markdown().splitlines()[2:] == [
+    table = Table("cost", "Cost", ("scene", "ratio"), [("dry", "4.3"), ("two-phase", "5.3")])
+    assert table.markdown().splitlines() == [
         "| scene | ratio |", "|---|---|", "| dry | 4.3 |", "| two-phase | 5.3 |",
     ]  # fmt: skip
     save(effects_chart([("dry", 4.3, 80.0), ("liquid", 5.4, 100.0), ("cheaper", 5.2, 96.0)]), tmp_path / "chart.png")
@@ -98,3 +98,19 @@ def test_shares_of_a_run(load_scene):
     assert all(0.0 < share < 1.0 for share in shares.values())
     assert all(seconds > 0.0 for seconds in each.values())
     assert dear["snapshots"] / dear["steps"] > 2.0 * shares["snapshots"] / shares["steps"]
+
+
+def test_tables_find_their_place_in_a_page(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "Before.\n<!-- benchmark cost -->\nold\n<!-- end -->\nBetween.\n<!-- benchmark machine --><!-- end -->"
+    )
+    tables = [Table(name, name, ("ratio",), [("4.3",)]) for name in ("cost", "of no place here")]
+    for _ in range(2):  # again, it changes nothing
+        put_into_page(page, tables, "a machine")
+    assert page.read_text() == (
+        "Before.\n<!-- benchmark cost -->\n\n| ratio |\n|---|\n| 4.3 |\n\n<!-- end -->\nBetween.\n"
+        "<!-- benchmark machine -->\n\na machine\n\n<!-- end -->"
+    )
+    with pytest.raises(ValueError, match="benchmark NAME"):
+        put_into_page(tmp_path / "none.md", tables, "a machine")

@@ -29,6 +29,12 @@ def benchmark(
         Path | None,
         typer.Option(metavar="DIR", help="Folder for tables and chart.", show_default=False),
     ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            help="Markdown page to put the tables into, below its lines <!-- benchmark NAME -->.", show_default=False
+        ),
+    ] = None,
     full: Annotated[bool, typer.Option("--full", help="Up to a million points; some minutes and 2 GB.")] = False,
     device: Annotated[str, typer.Option(help="Warp device: cpu, cuda:0, ...")] = "cpu",
 ) -> None:
@@ -44,6 +50,7 @@ def benchmark(
         from warp_mpm.performance.benchmark import CASE, effect_costs, machine, speed_tables
         from warp_mpm.performance.chart import effects_chart
         from warp_mpm.performance.table import Table as Made
+        from warp_mpm.performance.table import put_into_page
         from warp_mpm.plotting import save
         from warp_mpm.scenario import Scenario
 
@@ -65,7 +72,7 @@ def benchmark(
                 rows.append((name, f"{ratio:.2f}", f"{ratio - before:+.2f}", f"{cost:.1f}"))
                 before = ratio
             columns = ("effects, one more each", "yardsticks", "added", "ns per point and step")
-            tables = [Made("Cost of each effect, added to those above it", columns, rows)]
+            tables = [Made("effects", "Cost of each effect, added to those above it", columns, rows)]
             if out is not None:
                 save(effects_chart(costs), out / "effects.png")
         for table in tables:
@@ -77,10 +84,16 @@ def benchmark(
             console.print(shown)
         if out is not None:
             _write(out, what, tables, machine())
+        if page is not None:
+            put_into_page(page, tables, _machine_line(machine()))
 
 
 def _write(out: Path, what: What, tables: list[Table], taken_on: dict[str, str]) -> None:
     content = {"machine": taken_on, "tables": [asdict(table) for table in tables]}
     (out / f"{what}.json").write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
-    head = f"{taken_on['processor']}, Warp {taken_on['warp']}, Python {taken_on['python']}, {taken_on['taken']}\n\n"
-    (out / f"{what}.md").write_text(head + "\n".join(table.markdown() for table in tables))
+    shown = "\n".join(f"**{table.title}**\n\n{table.markdown()}" for table in tables)
+    (out / f"{what}.md").write_text(f"{_machine_line(taken_on)}\n\n{shown}")
+
+
+def _machine_line(taken_on: dict[str, str]) -> str:
+    return f"{taken_on['processor']}, Warp {taken_on['warp']}, Python {taken_on['python']}, {taken_on['taken']}"

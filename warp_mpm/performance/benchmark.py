@@ -117,7 +117,7 @@ def _ratios(scene: Scenario, device: str, progress: Progress) -> Table:
         held = sum(size for array, size in stepper.simulation.arrays.items() if array.startswith("points."))
         rows.append((name, f"{cost:.1f}", f"{cost / costs[0]:.2f}", f"{held / points:.0f}"))
     title = f"Cost of a step, {points:,} points"
-    return Table(title, ("scene", "ns per point and step", "yardsticks", "bytes per point"), rows)
+    return Table("ratios", title, ("scene", "ns per point and step", "yardsticks", "bytes per point"), rows)
 
 
 def _kernels(scene: Scenario, device: str, progress: Progress) -> Table:
@@ -128,7 +128,7 @@ def _kernels(scene: Scenario, device: str, progress: Progress) -> Table:
     idle = min(spent.values())
     whole = sum(each - idle for each in spent.values())
     rows = [(name, f"{(spent[name] - idle) / whole:.1%}") for name in simulation.launched_kernels]
-    return Table("Where the time of a two-phase step goes", ("kernel", "share"), rows)
+    return Table("kernels", "Where the time of a two-phase step goes", ("kernel", "share"), rows)
 
 
 def _sizes(base: Scenario, device: str, full: bool, progress: Progress) -> Table:
@@ -147,7 +147,7 @@ def _sizes(base: Scenario, device: str, full: bool, progress: Progress) -> Table
         costs = (f"{cost:.1f}", f"{cost / yard:.2f}", f"{cost / yard / first - 1.0:+.0%}")
         rows.append((f"{points:,}", *costs, f"{held:.0f}"))
     columns = ("points", "ns per point and step", "yardsticks", "against the first", "bytes per point, grid included")
-    return Table("Cost against the number of points (yardstick of 11,472)", columns, rows)
+    return Table("sizes", "Cost against the number of points (yardstick of 11,472)", columns, rows)
 
 
 def _domains(scene: Scenario, device: str, progress: Progress) -> Table:
@@ -162,7 +162,9 @@ def _domains(scene: Scenario, device: str, progress: Progress) -> Table:
         (name, f"{cost:.1f}", f"{cost / costs[0] - 1.0:+.1%}")
         for name, cost in zip(("60 m", "600 m"), costs, strict=True)
     ]
-    return Table("Cost against the length of the domain", ("domain", "ns per point and step", "difference"), rows)
+    return Table(
+        "domains", "Cost against the length of the domain", ("domain", "ns per point and step", "difference"), rows
+    )
 
 
 def _drag(base: Scenario, device: str, progress: Progress) -> Table:
@@ -178,7 +180,7 @@ def _drag(base: Scenario, device: str, progress: Progress) -> Table:
         row = (drag.replace("_", "-"), f"{record['steps']:,}", f"{record['time_step_max']:.2e}")
         rows.append((*row, f"{displacements[-1]:.4f} ({share:+.1%})"))
     columns = ("drag", "steps to t = 1.2 s", "greatest step [s]", "barrier displacement [m]")
-    return Table("What semi-implicit drag saves, at 0.4 m", columns, rows)
+    return Table("drag", "What semi-implicit drag saves, at 0.4 m", columns, rows)
 
 
 CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"

@@ -59,7 +59,7 @@ def recording(base: Scenario, device: str, progress: Progress) -> Table:
         "points of case 1", "steps", "samples every 5 ms", "snapshots every 50 ms", "Python between them",
         "one sample [µs]", "one snapshot [ms]",
     )  # fmt: skip
-    return Table("Where the time of a run goes, of the first step to the last", columns, rows)
+    return Table("recording", "Where the time of a run goes, of the first step to the last", columns, rows)
 
 
 def recording_shares(scene: Scenario, *, device: str) -> tuple[int, dict[str, float], dict[str, float]]:
@@ -110,7 +110,7 @@ def first_run(case: Path, progress: Progress) -> Table:
             busy, wall = done.stdout.split()[-2:]
             rows.append((name, f"{float(busy):.1f}", f"{float(wall):.1f}"))
     columns = ("start of case 1, to its first step", "processor [s]", "on the wall [s]")
-    return Table("First run and later ones", columns, rows)
+    return Table("start", "First run and later ones", columns, rows)
 
 
 def several_at_once(base: Scenario, progress: Progress) -> Table:
@@ -141,4 +141,4 @@ def several_at_once(base: Scenario, progress: Progress) -> Table:
         ("both at once", f"{fastest[2]:.1f}", f"{leanest[2]:.1f}", f"{fastest[1] / fastest[2]:.2f}"),
     ]
     columns = ("two runs of case 1", "on the wall [s]", "processor, each [s]", "throughput")
-    return Table(f"Two runs on {os.cpu_count()} cores, start and figures included", columns, rows)
+    return Table("several", f"Two runs on {os.cpu_count()} cores, start and figures included", columns, rows)
