@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import signal
+import time
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -14,6 +15,9 @@ from rich.text import Text
 
 from warp_mpm.run import RunOutcome, RunProgress
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Sliding
+
+REFRESH = 0.1
+"""Least time [s] between two states of the bar: a run has hundreds of records a second."""
 
 PLAIN_LINES = 10
 """Lines of progress in a pipe, where there is no bar."""
@@ -52,6 +56,7 @@ class RunDisplay:
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._lines = 0
+        self._shown = -math.inf
 
     def __enter__(self) -> Self:
         self._console.print(self._scenario.title, style="bold")
@@ -79,6 +84,10 @@ class RunDisplay:
     def show(self, progress: RunProgress) -> None:
         """Bring the display up to date."""
         if self._bar is not None:
+            now = time.monotonic()
+            if now - self._shown < REFRESH and progress.time < progress.end_time:
+                return
+            self._shown = now
             self._bar.update(self._task, completed=progress.time, description=_state(progress))
         elif progress.time >= self._lines / PLAIN_LINES * progress.end_time:
             self._lines = math.floor(progress.time / progress.end_time * PLAIN_LINES) + 1
