@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analytic.scene import scene_of
 from warp_mpm.accuracy.check import Check, drawn, holds, table
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
+from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.purchase import (
     PurchaseError,
@@ -128,6 +130,12 @@ class TestPlan:
         assert len(full) > len(quick)
         assert {s.key for s in quick if s.knob == DEFAULT} <= {s.key for s in full}
 
+    def test_spacing_that_no_decimal_tells_stays_what_it_is(self, scene: Scenario) -> None:
+        (setting,) = ladder(scene, [6.0 / 17.0])
+        # A crest is on a grid line to a millionth of a spacing.
+        assert 6.0 / setting.spacing == pytest.approx(17.0, abs=1e-9)
+        assert setting.name == "spacing 0.3529"
+
     def test_dry_scene_turns_no_drag(self) -> None:
         settings = plan(Scenario.load(SCENARIOS / "case_1_dry.json"), quick=True)
         assert not {"drag", "dry", "undrained"} & {s.knob for s in settings}
@@ -217,6 +225,7 @@ class TestVerdict:
         assert math.isinf(row.overall)
         assert row not in study.fronts["overall"]
         assert "diverged" in markdown(study, [])
+        assert lost.name in csv_table(study)
 
     def test_reference_run_is_off_by_what_it_is_not_known_to(self, scene: Scenario) -> None:
         settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
@@ -232,6 +241,20 @@ class TestVerdict:
         lines = csv_table(study).splitlines()
         assert len(lines) == 1 + sum(not s.physics for s in settings)
         assert len({len(re.findall(r',(?=(?:[^"]*"[^"]*")*[^"]*$)', line)) for line in lines}) == 1
+
+
+class TestFormulas:
+    def test_closed_form_tells_times_from_the_start_of_the_run(self, scene: Scenario) -> None:
+        """Case 1: 3 m at 10 m/s to the barrier; the closed form counts from the front's arrival."""
+        paper = next(one for one in formulas(scene) if "paper" in one.name)
+        impact = scene_of(scene.resolved()).impact()
+        assert paper.figures["peak_force_time"] == pytest.approx(0.3 + impact.peak_time)
+        assert paper.figures["impact_duration"] == impact.duration
+        assert 0.0 < paper.time < 0.01  # microseconds, whatever the machine
+
+    def test_fixed_barrier_has_no_sliding(self) -> None:
+        for one in formulas(Scenario.load(SCENARIOS / "case_1_fixed.json")):
+            assert "barrier_displacement_final" not in one.figures
 
 
 class TestPurchase:
@@ -276,6 +299,29 @@ class TestPurchase:
         offer = choose(self.WOBBLE, self.SOLD, accuracy=accuracy + 1e-9)
         assert offer.spacing == 3.0 / rows
         assert offer.values["peak_force"] == 4e5
+
+    def test_coarse_run_that_is_right_by_accident_promises_nothing(self) -> None:
+        lucky = Rung(0.6, 0.1, {"peak_force": 4e5, "impulse": 1e6})
+        assert choose([lucky, *self.WOBBLE], (*self.SOLD, 0.6), accuracy=0.04).spacing == 3.0 / 8
+
+    def test_figure_that_is_nought_is_no_figure(self) -> None:
+        """A barrier that could slide and does not."""
+        rungs = [replace(r, figures=r.figures | {"barrier_displacement_final": 0.0}) for r in self.LADDER]
+        offer = choose(rungs, self.SOLD, accuracy=0.05)
+        assert set(offer.errors) == {"peak_force", "impulse"}
+
+    @pytest.mark.parametrize(("courant_number", "runs"), [(0.95, 1), (0.5, 4)])
+    def test_shipped_ladder_serves_its_scene_at_the_default_settings(self, courant_number: float, runs: int) -> None:
+        probed: list[float] = []
+
+        def law(scenario: Scenario) -> dict[str, Any]:
+            probed.append(scenario.numerics.spacing_m)
+            return made_up(scenario)
+
+        own = Scenario.load(SCENARIOS / "case_1.json").replaced({"numerics.courant_number": courant_number})
+        offer = buy(own, accuracy=0.2, measure=law)
+        assert len(probed) == runs
+        assert ("shipped" in offer.source) == (runs == 1)
 
     def test_no_spacing_finer_than_was_run_is_promised_to_wobble_less(self) -> None:
         with pytest.raises(PurchaseError, match=r"best on offer is 3(\.1)?% at a spacing of 0\.375 m"):
@@ -375,9 +421,10 @@ class TestRunner:
         assert second[settings[1].key]["steps"] == -1  # read, not run
         assert second[settings[0].key]["figures"] == first[settings[0].key]["figures"]
 
-    def test_damaged_result_is_run_again(self, scene: Scenario, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("damaged", ["{", '{"status": "finished"}'])
+    def test_damaged_result_is_run_again(self, scene: Scenario, tmp_path: Path, damaged: str) -> None:
         (setting,) = ladder(scene.replaced({"output.end_time_s": 0.02}), [1.0])
-        (tmp_path / f"{setting.key}.json").write_text("{")
+        (tmp_path / f"{setting.key}.json").write_text(damaged)
         assert run_settings([setting], tmp_path, jobs=1)[setting.key]["status"] == "finished"
 
     def test_measure_tells_figures_curves_and_times(self, scene: Scenario) -> None:

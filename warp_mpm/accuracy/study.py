@@ -35,6 +35,7 @@ KNOBS: Mapping[str, tuple[Any, ...]] = {
     "volumetric_smoothing": (True, False),
     "pressure_relaxation": (0.0, 1.0, 2.0),
     "bulk_viscosity": (0.0, 0.2, 0.4),
+    "density_correction": (0.0, 1.0),
     "precision": ("float64", "float32"),
 }
 """Levels of each setting of `numerics` beside the spacing; the code has one kind of shape function, so no knob."""
