@@ -320,7 +320,7 @@ class Simulation:
         if self.effects.liquid:
             self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)
         clock = self._clock.numpy()
-        clock[at.SPEED_MAX] = (velocity**2).sum(axis=1).max()
+        clock[at.SPEED_MAX] = (velocity.reshape(-1, 2) ** 2).sum(axis=1).max()
         self._clock.assign(clock)
 
     # -- state -------------------------------------------------------------------------------------------------

@@ -23,6 +23,9 @@ from .layout import (
 )
 from .mohr_coulomb import make_return_mapping
 
+WORST = 0.6
+"""Crowding beyond which more makes no difference: drops that land on each other must not be thrown apart."""
+
 
 def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
     """Build the functions `trial_stress`, the elastic part of the constitutive law, and `volume_ratio`."""
@@ -73,7 +76,7 @@ def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
             keep * turned_shear + double * xy,
         )
         squares = (xx - third) * (xx - third) + (yy - third) * (yy - third) + third * third + F(2.0) * xy * xy
-        return trial, wp.sqrt(F(2.0 / 3.0) * squares)
+        return trial, wp.sqrt(F(wp.static(2.0 / 3.0)) * squares)
 
     return SimpleNamespace(trial_stress=trial_stress, volume_ratio=volume_ratio)
 
@@ -176,7 +179,7 @@ def make_constitutive(
             stretch = gradient[0] - gradient[3]
             shear = gradient[1] + gradient[2]
             ratio = filling * points.volume[p] / points.reference_volume[p]
-            now = wp.log(wp.clamp(ratio, F(0.5), F(2.0)))
+            now = wp.clamp(ratio - F(1.0), -F(wp.static(WORST)), F(wp.static(WORST)))
             crowding = points.crowding[p]
             share = wp.min(time_step * wp.sqrt(stretch * stretch + shear * shear), F(1.0))
             points.crowding[p] = crowding + share * (now - crowding)
@@ -234,10 +237,11 @@ def make_constitutive(
                         strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
                     )
             if GAP_BOUND:
-                largest_strain = room(filling) / parameters.porosity
-                if strain > largest_strain:
-                    strain = largest_strain
-                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+                if strain > F(0.0):
+                    largest_strain = room(filling) / parameters.porosity
+                    if strain > largest_strain:
+                        strain = largest_strain
+                        wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
             points.liquid_strain[p] = strain
 
         before = x

@@ -24,6 +24,7 @@ TIME = 0
 TARGET = 1
 TIME_STEP = 2
 SPEED_MAX = 3
+"""Greatest square of a speed, of either phase [m2/s2]."""
 GRID_SHIFT = 4
 """Displacement of the grid (and of the barrier, with which it rides) since the start [m]."""
 BARRIER_VELOCITY = 5
@@ -143,7 +144,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
     if effects.density_correction:
-        points["crowding"] = array(dtype=scalar)  # log of volume over room, a mean over the last unit of shear strain
+        points["crowding"] = array(dtype=scalar)  # volume over room, less 1: a mean over the last unit of shear strain
     if effects.pressure_relaxation:
         points["pressure_residual"] = array(dtype=scalar)
         points["surrounded"] = array(dtype=wp.int32)  # 1: the corners around are filled, so that the filter acts

@@ -86,7 +86,7 @@ def clock_arrays(scenario: Scenario, effects: Effects, initial: MaterialPoints, 
     """Clock, counters, impulses, sums and the prescribed motion, by their names; entries as in `kernels.layout`."""
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.SMALLEST_TIME_STEP] = math.inf
-    clock[at.SPEED_MAX] = scenario.flow.speed**2 * (2.0 if effects.two_phase else 1.0)
+    clock[at.SPEED_MAX] = scenario.flow.speed**2
     solid, liquid = float(initial.solid_mass.sum()), float(initial.liquid_mass.sum())
     if not effects.two_phase:
         solid, liquid = solid + liquid, 0.0
