@@ -42,6 +42,8 @@ def make_transfer(
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     PORE_FORCE = effects.effective_contact_force
+    GROUND_FRICTION = effects.ground == "frictional"
+    BARRIER_FRICTION = effects.barrier_friction
     POROSITY = effects.porosity_update
     pressure_at = pore.pressure
     porosity = pore.porosity
@@ -157,10 +159,25 @@ def make_transfer(
             force_y = V(xy, yy)
         alone = F(0.0)
         share = F(1.0)
+        rubbed = wp.int32(0)
         if PORE_FORCE:
             alone = pressure * volume * time_step / parameters.true_liquid_density
             if FLIP:
                 share = time_step / parameters.solid_density
+            # Only nodes of a surface that rubs read the surplus. A point's farthest node is 1.5 sqrt(2) cells away, and a
+            # node acts for a face up to half a cell outside.
+            if GROUND_FRICTION:
+                if cj - 2 <= parameters.ground_row:
+                    rubbed = wp.int32(1)
+            if BARRIER_FRICTION:
+                seen = x - V2(shift, F(0.0))
+                reach = F(3.0) * parameters.spacing
+                if (
+                    wp.dot(parameters.face_normal, seen) < reach
+                    and seen[1] - parameters.crest_height < reach
+                    and wp.dot(parameters.back_normal, seen) - parameters.back_offset < reach
+                ):
+                    rubbed = wp.int32(1)
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
         affine_x = V()
@@ -195,10 +212,12 @@ def make_transfer(
                     grid.momentum[i, j] += wy[m] * column_velocity
                     grid.force[i, j] += wy[m] * column_force + dy[m] * column_slope
                 if PORE_FORCE:
-                    gx = dx[k] * wy[m]
-                    gy = wx[k] * dy[m]
-                    surplus = gx * (V2(alone, F(0.0)) - share * force_x) + gy * (V2(F(0.0), alone) - share * force_y)
-                    grid.liquid_surplus[i, j] += surplus
+                    if rubbed == 1:
+                        gx = dx[k] * wy[m]
+                        gy = wx[k] * dy[m]
+                        along_x = V2(alone, F(0.0)) - share * force_x
+                        along_y = V2(F(0.0), alone) - share * force_y
+                        grid.liquid_surplus[i, j] += gx * along_x + gy * along_y
 
     @wp.func
     def speed_squared(velocity: V) -> wp.float64:
