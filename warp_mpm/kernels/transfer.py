@@ -164,8 +164,8 @@ def make_transfer(
             alone = pressure * volume * time_step / parameters.true_liquid_density
             if FLIP:
                 share = time_step / parameters.solid_density
-            # Only nodes of a surface that rubs read the surplus. A point's farthest node is 1.5 sqrt(2) cells away, and a
-            # node acts for a face up to half a cell outside.
+            # Only nodes of a surface that rubs read the surplus. A point's farthest node is 1.5 sqrt(2) cells away, and
+            # a node acts for a face up to half a cell outside.
             if GROUND_FRICTION:
                 if cj - 2 <= parameters.ground_row:
                     rubbed = wp.int32(1)
