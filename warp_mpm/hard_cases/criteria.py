@@ -65,6 +65,13 @@ CRITERIA = (
         "(`bounds.shock_speed`): water hammer at low speed, stagnation at high",
     ),
     Criterion(
+        "stress_ratio",
+        1.0,
+        1.0,
+        "greatest principal effective stress over the same, and 2 c that cohesion bears beside it; not of an elastic "
+        "material, whose stress is singular at a corner",
+    ),
+    Criterion(
         "penetration",
         0.5 + 1e-12,
         0.5 + 1e-5,
@@ -89,8 +96,8 @@ CRITERIA = (
         "pressure_noise",
         0.25,
         0.25,
-        "median over the snapshots of the rms difference between a point's pressure and the mean of its cell, over the "
-        "rms pressure or rho g h, whichever is greater; at rest on two cells of depth the gradient alone makes 0.25",
+        "median over the snapshots of the rms difference between a point's pressure and the mean of its cell, less the "
+        "gradient at rest, over the rms pressure or rho g h, whichever is greater: a quarter of the signal",
     ),
     Criterion(
         "halving_peak_force",

@@ -16,7 +16,7 @@ from warp_mpm.hard_cases.bounds import impact_speed, pressure_bound, speed_bound
 from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
 from warp_mpm.recording import Schedule
 from warp_mpm.results import Snapshot
-from warp_mpm.scenario import STANDARD_GRAVITY, Scenario
+from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
 from warp_mpm.summary import impact_figures, momentum_error
 from warp_mpm.time_step import step_limits
@@ -110,6 +110,10 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
             "wall_time": time.perf_counter() - started,
         }
     )
+    if scenario.flow.material.plasticity:
+        fastest = measured.figures["speed_max"]
+        bound = pressure_bound(scenario, fastest) + 2.0 * scenario.flow.material.cohesion_Pa
+        measured.figures["stress_ratio"] = measured.figures["stress_max"] / max(bound, 1.0)
     measured.figures["yield_excess"] /= max(measured.figures["stress_max"], _trial_stress(scenario), 1.0)
     if noise:
         measured.figures["pressure_noise"] = float(np.median(noise))
@@ -187,8 +191,9 @@ def _widen(extremes: dict[str, float], scenario: Scenario, snapshot: Snapshot) -
         "porosity_low": -float(porosity.min()),
         "porosity_high": float(porosity.max()),
     }
-    if scenario.flow.material.plasticity:
-        found["yield_excess"], found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
+    found["yield_excess"], found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
+    if not scenario.flow.material.plasticity:
+        del found["yield_excess"]
     for name, value in found.items():
         extremes[name] = float(np.maximum(extremes[name], value))  # which keeps NaN
 
@@ -251,8 +256,11 @@ def _pressure_noise(scenario: Scenario, snapshot: Snapshot) -> list[float]:
     full = count[cell] >= 3
     if not full.any():
         return []
-    mean = np.bincount(cell, pressure) / count
     material = scenario.flow.material
+    assert isinstance(material, UndrainedMaterial)
+    # Over the pressure of the liquid at rest, whose gradient is no noise.
+    excess = pressure - material.liquid_density_kg_per_m3 * (snapshot.position @ scenario.gravity.vector)
+    mean = np.bincount(cell, excess) / count
     still = material.density * STANDARD_GRAVITY * scenario.flow.depth
     scale = max(float(np.sqrt(np.mean(pressure[full] ** 2))), still)
-    return [float(np.sqrt(np.mean((pressure - mean[cell])[full] ** 2)) / scale)]
+    return [float(np.sqrt(np.mean((excess - mean[cell])[full] ** 2)) / scale)]

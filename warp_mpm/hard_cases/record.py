@@ -67,6 +67,10 @@ COLUMNS = (
     ("pressure_ratio", "pressure"),
     ("penetration", "depth"),
     ("pressure_noise", "noise"),
+    ("stress_ratio", "stress"),
+    ("pushed_share", "set back"),
+    ("gaps_bounded_share", "gaps cut"),
+    ("voids_closed_share", "no voids"),
     ("halving_peak_force", "Δt/2: force"),
     ("halving_displacement", "Δt/2: Δx"),
 )

@@ -49,6 +49,16 @@ SAFEGUARDS = (
         "found together, it starts at less than 0.5 m/s",
     ),
     Safeguard(
+        "grains keep their volume",
+        "once its voids are closed, a point's stress acts on the volume of its grains, and its waves gain speed",
+        "`dry_soft_45`: points collapse to a millionth of their volume, at stresses of 1e11 Pa",
+    ),
+    Safeguard(
+        "cavitation",
+        "the liquid bears no tension, or as much as the scene says",
+        "`speed_50`: spray is held together by its own noise, which grows to a third of the signal",
+    ),
+    Safeguard(
         "divergence check",
         "every velocity each step, every quantity at each sample",
         "a stress or pressure that is no number: its points would leave in silence, or stay at zero pressure",
@@ -61,20 +71,42 @@ SAFEGUARDS = (
 )
 
 KNOWN_LIMITS = (
-    "Points rest up to 0.58 cells deep in a face at 89° for moments, 0.5 at the snapshots: between two columns of "
-    "nodes the contact's own reach varies by half a cell. Penetration halves with the spacing, in metres.",
-    "Over a barrier lower than the flow (`low_barrier`) the displacement changes by 13 % when the time step is halved "
-    "at two cells of barrier height, 8 to 12 % at four, 5 % at eight; the peak force by 8, 3 and 2 %: the transfer "
-    "dissipates per step, less on finer grids.",
-    "Where a jet lands, single points meet the ground at up to half of the bound that their water hammer sets, for a "
-    "few milliseconds. "
-    "The figure `pore_pressure_max` of a run leaves them out, `pore_pressure_max_anywhere` holds them.",
-    "The skeleton's stiffness is linear: a soft one of little porosity (0.05, below 1 MPa) is pressed beyond its voids "
-    "by an impact, porosity by volume below zero. The run stays stable, the material law has no answer.",
-    "A dry flow onto a wet deposit cannot be stated: a scene holds one material.",
+    "Inclined faces are met by nodes, within half a cell of them: the zone in which no node moves begins, as a face "
+    "crosses the grid, at the face or up to a cell behind it. Points under pressure creep in, up to half a cell, from "
+    "where they are set back (most in `one_point_wide`, `dry_20` and `face_89`); that halves with the spacing, in "
+    "metres. Level and upright surfaces on the lines of the grid are exact. To stop a node by its share of the cell "
+    "would not mend it: done in each step, any share soon stops all of the flow there.",
+    "`low_barrier`, four cells high under twelve of flow: the barrier slides 9.0, 10.3 and 11.8 m at Courant numbers "
+    "of 0.95, 0.48 and 0.24, with FLIP 8.9, 9.6 and 9.4 m. The affine transfer filters, once per step, what is not "
+    "affine over a cell, and the layer that shears over the crest is one or two cells thick. At the default step the "
+    "two transfers agree to 1 %.",
+    "At 0.5 m, the peak force of `dry_friction_0`, `face_89` and `wall` changes by 5.1 to 5.3 % when the time step is "
+    "halved, and the displacement of `explicit_drag` by 6.2 %; at 0.25 m, as they are in the collection, by 0.6 to 1.1 "
+    "and 3.3 %.",
+    "Pressures of points scatter about their cells' by more than a quarter of the signal in water of 2.2 GPa "
+    "(`bulk_modulus_2e9`, 0.29), where a thin jet lands (`falling_jet`, 0.32), and on two cells of depth (`thin_flow`, "
+    "0.26).",
+    "FLIP keeps velocities of points that the grid does not see. Where the flow is faster than sound (`flip_soft`), a "
+    "point's own velocity grows to 1.4 times the bound while it moves with the rest, and 1.1 % of the energy appears.",
+    "Where a jet lands, single points meet the ground at up to 0.6 of the bound that their water hammer sets, for a "
+    "few milliseconds. The figure `pore_pressure_max` leaves them out, `pore_pressure_max_anywhere` holds them.",
+    "The skeleton's law is linear in the density. A soft one (0.1 MPa) under a fast impact or under its own weight is "
+    "pressed until its voids are closed, in up to a third of the points and steps of `dry_soft_45`; the grains' own "
+    "stiffness is not in the model. The run stays stable and its energy closed.",
+    "A dry flow onto a wet deposit cannot be stated: a scene holds one material. It would take a second body in the "
+    "scenario, constants per point in place of constants per scene in four kernels, and nodes at which the liquid is "
+    "there for one body and not for the other.",
     "Bit-for-bit continuation is promised on the processor only: on a GPU sums have no fixed order.",
 )
 """Found by the collection and not mended."""
 
-KNOWN_FAILURES = {"low_barrier": frozenset({"halving_displacement"})}
+KNOWN_FAILURES = {
+    "bulk_modulus_2e9": frozenset({"pressure_noise", "halving_displacement"}),
+    "dry_20": frozenset({"pushed_share"}),
+    "falling_jet": frozenset({"pressure_noise"}),
+    "flip_soft": frozenset({"energy_error", "speed_ratio", "halving_peak_force"}),
+    "low_barrier": frozenset({"halving_displacement"}),
+    "one_point_wide": frozenset({"pushed_share"}),
+    "thin_flow": frozenset({"pressure_noise"}),
+}
 """Criteria that a case is known not to meet, each explained in `KNOWN_LIMITS`."""
