@@ -42,11 +42,19 @@ def shock_speed(scenario: Scenario, speed: float | NDArray[np.float64]) -> float
 
 
 def pressure_bound(scenario: Scenario, speed: float) -> float:
-    """Greatest pore pressure [Pa] where the fastest point has `speed` v [m/s]: rho U(v) v, the pressure behind the
-    shock that stops it (water hammer at low speed, stagnation at high), and rho g h at rest beneath."""
+    """Greatest pressure [Pa] where the fastest point has `speed` v [m/s], and rho g h at rest beneath.
+
+    Behind the shock that stops it, it is rho U(v) v: water hammer at low speed, stagnation at high. Where two surfaces
+    meet, each stops the part of the velocity across it, one behind the other, and the pressures add: for a velocity at
+    the angle alpha, rho (U(v cos alpha) v cos alpha + U(v sin alpha) v sin alpha), sqrt(2) rho c v at most if v is
+    small against c and no more than on one surface if it is great. Of all angles, the worst.
+    """
     material, depth = scenario.flow.material, float(np.ptp(scenario.flow.polygon[:, 1]))
     at_rest = material.density * scenario.gravity.acceleration_m_per_s2 * depth
-    return float(material.density * shock_speed(scenario, speed) * speed + at_rest)
+    angle = np.linspace(0.0, 0.5 * math.pi, 91)
+    one, other = speed * np.cos(angle), speed * np.sin(angle)
+    hammer = material.density * (shock_speed(scenario, one) * one + shock_speed(scenario, other) * other)
+    return float(hammer.max()) + at_rest
 
 
 def voids_close(scenario: Scenario) -> bool:

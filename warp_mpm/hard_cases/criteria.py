@@ -61,15 +61,15 @@ CRITERIA = (
         "pressure_ratio",
         1.0,
         1.0,
-        "greatest pore pressure over rho U v + rho g h, U the speed of the shock that stops the fastest point "
-        "(`bounds.shock_speed`): water hammer at low speed, stagnation at high",
+        "greatest pore pressure over that behind the shock that stops the fastest point, in a corner, and rho g h "
+        "(`bounds.pressure_bound`): water hammer at low speed, stagnation at high",
     ),
     Criterion(
         "stress_ratio",
         1.0,
         1.0,
-        "greatest principal effective stress over the same, and 2 c that cohesion bears beside it; not of an elastic "
-        "material, whose stress is singular at a corner",
+        "greatest principal effective stress over the same at the speed that energy gives at least, and 2 c that "
+        "cohesion bears; not of an elastic material, whose stress is singular at a corner",
     ),
     Criterion(
         "penetration",
