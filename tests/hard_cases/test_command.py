@@ -14,13 +14,13 @@ def command(*arguments):
 
 def test_cases_are_run_drawn_and_recorded(tmp_path):
     page = tmp_path / "robustness.md"
-    result = command("--quick", "--only", "one_point", "--only", "thin_flow", "--out", tmp_path / "out", "--page", page)
+    result = command("--quick", "--only", "one_point", "--only", "face_90", "--out", tmp_path / "out", "--page", page)
     assert result.exit_code == 0, result.output
     assert "2 of 2 cases are stable" in result.stdout
     figures = json.loads((tmp_path / "out" / "hard_cases.json").read_text())
-    assert figures["thin_flow"]["stable"]
-    assert 0.0 < figures["thin_flow"]["figures"]["speed_ratio"] < 1.0
-    for name in ("one_point", "thin_flow"):
+    assert figures["face_90"]["stable"]
+    assert 0.0 < figures["face_90"]["figures"]["speed_ratio"] < 1.0
+    for name in ("one_point", "face_90"):
         assert (tmp_path / "robustness" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert f"![{name}](robustness/{name}.png)" in page.read_text()
 

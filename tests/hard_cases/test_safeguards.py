@@ -1,7 +1,5 @@
 """Each safeguard switched off, and the scene that then fails. One that nothing needs would be removed."""
 
-import dataclasses
-
 import numpy as np
 
 from warp_mpm.hard_cases.collection import hard_cases
@@ -136,9 +134,9 @@ def test_bulk_viscosity():
 class ExplicitDrag(Simulation):
     """Explicit drag at the time step of the implicit one."""
 
-    def _make_parameters(self):
-        self._limits = dataclasses.replace(self._limits, drag_step=np.inf)
-        return super()._make_parameters()
+    def __init__(self, scenario):
+        super().__init__(scenario)
+        self._parameters.largest_stable_step = np.inf
 
 
 def test_implicit_drag():

@@ -92,8 +92,8 @@ KNOWN_LIMITS = (
     "few milliseconds. The figure `pore_pressure_max` leaves them out, `pore_pressure_max_anywhere` holds them.",
     "The skeleton's law is linear in the density. A soft one (0.1 MPa) under a fast impact or under its own weight is "
     "pressed until its voids are closed, in up to a third of the points and steps of `dry_soft_45`; the grains' own "
-    "stiffness is not in the model. The run stays stable and its energy closed; single points overshoot the stress behind "
-    "the shock, up to 2.7 times in random scenes.",
+    "stiffness is not in the model. The run stays stable and its energy closed; single points overshoot the stress "
+    "behind the shock, up to 2.7 times in random scenes.",
     "A dry flow onto a wet deposit cannot be stated: a scene holds one material. It would take a second body in the "
     "scenario, constants per point in place of constants per scene in four kernels, and nodes at which the liquid is "
     "there for one body and not for the other.",
