@@ -31,7 +31,7 @@ from warp_mpm.accuracy.purchase import (
 from warp_mpm.accuracy.runner import StudyProgress, run_settings
 from warp_mpm.accuracy.study import COMBINATIONS, DEFAULT, KNOBS, ladder, plan, run_key, scene_key
 from warp_mpm.accuracy.tables import csv_table, markdown
-from warp_mpm.accuracy.verdict import evaluate, front
+from warp_mpm.accuracy.verdict import Study, evaluate, front
 from warp_mpm.scenario import Scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -195,6 +195,30 @@ class TestVerdict:
         price = study.price("peak_force", 0.05)
         assert price is not None
         assert price.setting.spacing == 0.6
+
+    def test_finer_runs_count_against_the_default_only_where_the_other_has_them_too(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=True)
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        knob, level = COMBINATIONS[0]
+
+        def with_error(other_at_own: float, default_at_own: float) -> Study:
+            """The default stumbles at 0.3 m, where the other was not run; the other costs next to nothing."""
+            rows = []
+            for row in study.rows:
+                if row.setting.knob == DEFAULT:
+                    wrong, result = {0.4: default_at_own, 0.3: 0.2}.get(row.setting.spacing, 0.0), row.result
+                elif (row.setting.knob, row.setting.level) == (knob, level):
+                    wrong, result = {0.4: other_at_own}.get(row.setting.spacing, 0.0), {**row.result, "cpu_time": 1e-3}
+                else:
+                    wrong, result = 1.0, row.result
+                rows.append(replace(row, overall=wrong, result=result))
+            return replace(study, rows=rows)
+
+        doubt = study.doubt("overall")
+        assert with_error(0.1, 0.0).default_beaten_by is None
+        beaten = with_error(0.1, 0.11 + doubt).default_beaten_by
+        assert beaten is not None
+        assert beaten.setting.knob == knob
 
     def test_nothing_is_sold_below_what_the_reference_is_known_to(self, scene: Scenario) -> None:
         settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])

@@ -136,26 +136,29 @@ class Study:
         if default is None:
             return None
         margin = max(self.doubt("overall"), 0.002)
-        better = [
-            row
-            for row in self.rows
-            if row.time < 0.9 * default.time
-            and self._lasting(row, "overall") < self._lasting(default, "overall") - margin
-        ]
+        better = []
+        for row in self.rows:
+            # The default's ladder goes on to finer spacings, which must not count against it alone.
+            finest = min(peer.setting.spacing for peer in self._ladder(row))
+            lasting = self._lasting(default, "overall", finest=min(finest, default.setting.spacing))
+            if row.time < 0.9 * default.time and self._lasting(row, "overall") < lasting - margin:
+                better.append(row)
         return min(better, key=lambda row: row.overall, default=None)
 
-    def _lasting(self, row: Row, name: str) -> float:
-        """Greatest error of a setting and of the finer ones of its ladder; infinite where it has no ladder."""
-        if not row.errors:
-            return math.inf
-        peers = [
-            other
-            for other in self.rows
-            if (other.setting.knob, other.setting.level) == (row.setting.knob, row.setting.level)
+    def _ladder(self, row: Row) -> list[Row]:
+        """The runs that differ from a row in nothing but the spacing, and itself."""
+        setting = row.setting
+        return [
+            other for other in self.rows if (other.setting.knob, other.setting.level) == (setting.knob, setting.level)
         ]
-        if len(peers) < LADDER:
+
+    def _lasting(self, row: Row, name: str, *, finest: float = 0.0) -> float:
+        """Greatest error of a setting and of the finer ones of its ladder, down to the spacing `finest` [m]; infinite
+        where it has no ladder."""
+        ladder = self._ladder(row)
+        if not row.errors or len(ladder) < LADDER:
             return math.inf
-        return max(error_of(other, name) for other in peers if other.setting.spacing <= row.setting.spacing)
+        return max(error_of(other, name) for other in ladder if finest <= other.setting.spacing <= row.setting.spacing)
 
 
 def error_of(row: Row, name: str) -> float:
