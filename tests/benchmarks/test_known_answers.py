@@ -5,8 +5,10 @@ import pytest
 from warp_mpm.validation.catalogue import CASES
 
 KNOWN_SHORT = {
-    # A skeleton without rate dependence runs out too far when it falls from high.
-    "collapse": ("a = 4: run-out", "a = 2: run-out"),
+    # The density correction leaves some crowding in the corner: 1 to 2.5 % of the vertical momentum, 5.4 % at 90 degrees.
+    "jet": ("90°: vertical, deflector and ground", "error of F_y"),
+    # A skeleton without rate dependence stops early where it is low, and runs out too far when it falls from high.
+    "collapse": ("a = 0.5: run-out", "a = 4: run-out"),
 }
 """Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
 
