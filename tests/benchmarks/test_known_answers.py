@@ -5,7 +5,7 @@ import pytest
 from warp_mpm.validation.catalogue import CASES
 
 KNOWN_SHORT = {
-    # The density correction leaves some crowding in the corner: 1 to 2.5 % of the vertical momentum, 5.4 % at 90 degrees.
+    # The density correction leaves some crowding in the corner: up to 2.5 % of the vertical momentum, at 90° 5.4 %.
     "jet": ("90°: vertical, deflector and ground", "error of F_y"),
     # A skeleton without rate dependence stops early where it is low, and runs out too far when it falls from high.
     "collapse": ("a = 0.5: run-out", "a = 4: run-out"),
