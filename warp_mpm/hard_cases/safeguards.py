@@ -32,6 +32,11 @@ SAFEGUARDS = (
         "`set_iib`: after the landing nine points in ten keep a gap, and the deposit loses half its pore pressure",
     ),
     Safeguard(
+        "density correction",
+        "points that crowd beyond the room there is are compressed, so that pressure makes them spread again",
+        "a jet that an upright wall turns: a tenth of its momentum along the wall is missing; cells under a bore overfill",
+    ),
+    Safeguard(
         "bulk viscosity",
         "artificial pressure against compression at the rate of sound",
         "a column stopped at its base: the pressure behind the front of sound overshoots by a quarter",
