@@ -19,7 +19,7 @@ def scene(load_scene):
 
 
 def test_predictions_hold(scene, tmp_path):
-    """Steps within 10 %. How well the time is foretold is for `benchmark` to tell: others would disturb a test of it."""
+    """Steps within 10 %. How well the time is foretold is not tested: what else the machine does would decide it."""
     card = make_plan(scene)
     simulation = Simulation(scene)
     output = scene.output
