@@ -34,7 +34,7 @@ SAFEGUARDS = (
     Safeguard(
         "density correction",
         "points that crowd beyond the room there is are compressed, so that pressure makes them spread again",
-        "a jet turned by an upright wall: a tenth of its momentum along the wall is missing; cells under a bore overfill",
+        "a jet turned by an upright wall loses a tenth of its momentum along the wall; cells under a bore overfill",
     ),
     Safeguard(
         "bulk viscosity",
