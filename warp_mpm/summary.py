@@ -156,15 +156,20 @@ def mass_error(series: Series) -> float | None:
     return float(np.abs(whole - whole[0]).max() / whole[0])
 
 
+STANDSTILL = 1e-30
+"""Speed [m/s] below which nothing moves: single precision does not hold its square."""
+
+
 def momentum_error(series: Series, gravity: float) -> float | None:
-    """Greatest momentum residual over the greatest of the flow's momentum and the impulse of its weight."""
+    """Greatest momentum residual over the greatest of the flow's momentum and the impulse of its weight; None where
+    nothing moves."""
     if "momentum_residual_x" not in series:
         return None
     residual = np.hypot(series["momentum_residual_x"], series["momentum_residual_y"]).max()
     momentum = np.hypot(series["momentum_x"], series["momentum_y"]).max()
     mass = series["solid_mass"][0] + (series["liquid_mass"][0] if "liquid_mass" in series else 0.0)
     scale = max(float(momentum), float(mass * gravity * (series["time"][-1] - series["time"][0])))
-    return float(residual) / scale if scale > 0.0 else None
+    return float(residual) / scale if scale > STANDSTILL * float(mass) else None
 
 
 def energy_error(series: Series) -> float | None:

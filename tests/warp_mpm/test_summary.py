@@ -104,6 +104,8 @@ def test_errors_of_the_ledger():
         "barrier_work": np.array([0.0, 400.0, 700.0]),
     }
     assert mass_error(series) == pytest.approx(3 / 150)
+    still = {name: 1e-60 * values if name.startswith("momentum_") else values for name, values in series.items()}
+    assert momentum_error(still, gravity=0.0) is None
     assert momentum_error(series, gravity=0.0) == pytest.approx(5 / 1000)
     assert momentum_error(series, gravity=9.81) == pytest.approx(5 / (150 * 9.81))
     assert energy_error(series) == pytest.approx(10 / 1000)  # 1010 J at the second time, from 1000 J
