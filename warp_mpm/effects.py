@@ -57,19 +57,14 @@ class Effects:
         return self.volumetric_smoothing or self.pressure_relaxation
 
     @property
-    def gap_record(self) -> bool:
-        """A phase may open and has to close again before it bears pressure."""
-        return self.liquid or self.plasticity
-
-    @property
     def friction(self) -> bool:
         """Some surface rubs on the flow, so that the effective normal force is needed."""
         return self.barrier_friction or self.ground == "frictional"
 
     @property
     def effective_contact_force(self) -> bool:
-        """The nodal pore-pressure force is kept apart (with two phases it is the liquid's force anyway)."""
-        return self.friction and self.formulation == "undrained"
+        """Friction follows the effective normal force, so that the nodes tell what the liquid would do alone."""
+        return self.friction and self.liquid
 
     @property
     def module_name(self) -> str:

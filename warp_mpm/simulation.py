@@ -179,9 +179,9 @@ class Simulation:
         self._launch("gather", count, points, grid, parameters, clock)
         if effects.smoothing_grid:
             self._launch("average", self._workers, grid, parameters)
-        self._launch("update", count, points, grid, parameters, clock, self._counters, self._left)
-        if effects.plasticity:
-            self._launch("plasticity", count, points, parameters)
+        self._launch("advect", count, points, grid, parameters, clock, self._counters, self._left)
+        self._launch("update", count, points, parameters, clock)
+        self._launch("bound", count, points, parameters, clock)
         self._launch(
             "tick",
             1,

@@ -21,17 +21,17 @@ BARRIERS = {"sliding": ["collect", "slide", "barrier"], "fixed": ["collect", "ba
 
 POINT_NUMBERS = {
     "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
-            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1, "crowding": 1},
+            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1, "crowding": 1,
+            "smooth": 2},
 }  # fmt: skip
-POINT_NUMBERS["undrained"] = POINT_NUMBERS["dry"] | {"liquid_strain": 1, "pressure_residual": 1}
+POINT_NUMBERS["undrained"] = POINT_NUMBERS["dry"] | {"liquid_strain": 1, "pressure_residual": 1, "smooth": 4}
 POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
-    "velocity": 4, "affine_x": 4, "affine_y": 4, "liquid_divergence": 1,
+    "velocity": 4, "affine_x": 4, "affine_y": 4, "smooth": 5,
 }  # fmt: skip
 """Floating-point numbers that a material point holds, by formulation."""
 
-NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2 + 2, "undrained": 1 + 2 + 2 + 4 + 2 + 2, "two_phase": 1 + 4 + 4 + 5 + 2}
-"""And a node: mass, momentum, velocity, corner sums, corner room (twice); undrained friction needs the water's own
-share."""
+NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2, "undrained": 1 + 2 + 4 + 2 + 2, "two_phase": 1 + 4 + 5 + 2 + 2}
+"""And a node: mass, velocity, corner sums, corner room (twice); friction needs to know what a liquid would do alone."""
 
 LIQUID_WORDS = ("liquid", "pore", "pressure_residual", "drag", "surrounded", "cavitation", "relaxation")
 
@@ -68,7 +68,8 @@ def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
     simulation = Simulation(scenario)
     simulation.advance(1e-4)
     # The shipped scenes are plastic, on smooth ground, with smoothing; they differ in flow and barrier.
-    step = [*TRANSPORT, "ground", *BARRIERS[scenario.barrier.motion.kind], "gather", "average", "update", "plasticity"]
+    step = [*TRANSPORT, "ground", *BARRIERS[scenario.barrier.motion.kind], "gather", "average", "advect"]
+    step += ["update", "bound"]
     assert noted["launched"] == ["start", *step, "tick"]
     assert simulation.launched_kernels == (*step, "tick")
 

@@ -35,12 +35,11 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
     transfer = make_transfer(types, shapes, pore, module)
-    momentum = make_grid_momentum(types, module)
     constitutive = make_constitutive(types, shapes, pore, module)
     clock = make_clock(types, module)
     kernels = SimpleNamespace(
         types=types,
-        move=momentum.move,
+        move=make_grid_momentum(types, module).move,
         **transfer.__dict__,
         **constitutive.__dict__,
         start=clock.start,
@@ -48,7 +47,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         ledger=make_ledger(types, pore, module).ledger,
     )
     if effects.ground != "none" or effects.side_walls or effects.ceiling or effects.barrier != "none":
-        contact = make_contact(types, momentum, module)
+        contact = make_contact(types, module)
         kernels.__dict__.update(contact.kernels)
         if effects.barrier == "sliding":
             kernels.slide = make_rigid_barrier(types, contact, module).slide

@@ -1,9 +1,10 @@
-"""End of the step at the material points: strains, effective stress, pore pressure, position ("update stress last")."""
+"""End of the step at the material points: position, strains, effective stress, pore pressure ("update stress last")."""
 
 from types import SimpleNamespace
 
 import warp as wp
 
+from .elementary import make_elementary
 from .layout import (
     BARRIER_VELOCITY,
     DIVERGED,
@@ -84,10 +85,16 @@ def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
 def make_constitutive(
     types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
 ) -> SimpleNamespace:
-    """Build the kernels `update` and, if called for, `plasticity` (over points)."""
+    """Build the kernels `advect`, `update` and `bound` (over points).
+
+    What is rare, or looks beyond its own point, stands in `advect` and `bound`. `update` is left with nothing
+    but arithmetic on numbers of its own point, without branches or neighbours: a compiler turns that into vector
+    instructions, which take a fifth of the time.
+    """
     effects = types.effects
     F = types.scalar
     V2 = types.V2
+    V4 = types.V4
     S = types.S
     Points = types.Points
     Grid = types.Grid
@@ -95,6 +102,8 @@ def make_constitutive(
     hats = shapes.hats
     pressure_at = pore.pressure
     porosity = pore.porosity
+    elementary = make_elementary(types)
+    read, write, larger, smaller = elementary.read, elementary.write, elementary.larger, elementary.smaller
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -108,19 +117,52 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.barrier in ("sliding", "driven")
-    GAP_BOUND = effects.gap_record and effects.smoothing_grid
+    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
+    SOLID_GAP = effects.smoothing_grid and effects.plasticity
+    LIQUID_GAP = effects.smoothing_grid and effects.liquid
 
     elasticity = make_elasticity(types)
     trial_stress = elasticity.trial_stress
     volume_ratio = elasticity.volume_ratio
+    return_mapping = make_return_mapping(types) if PLASTICITY else None
 
     @wp.func
     def room(filling: F) -> F:
         """Largest volume strain of a gap [-]: it cannot exceed what the points around leave free."""
         return -wp.log(wp.clamp(filling, F(1.0e-12), F(1.0)))
 
+    @wp.func
+    def leave(points: Points, p: wp.int32, x: V2, parameters: Parameters, left: wp.array(dtype=wp.float64)):
+        """Take a point out of the domain, and keep account of what it takes along."""
+        points.inside[p] = 0
+        # It is passed over from now on, but by `update`, to which it is a point at rest.
+        points.gradient[p] = V4()
+        if CORNERS:
+            points.smooth[p] = S()
+        if RELAXATION:
+            points.surrounded[p] = 0
+        if OWN_DIVERGENCE:
+            points.liquid_divergence[p] = F(0.0)
+        reference = points.reference_volume[p]
+        v = points.velocity[p]
+        solid = parameters.solid_density * reference
+        momentum = solid * V2(v[0], v[1])
+        energy = F(0.5) * solid * (v[0] * v[0] + v[1] * v[1])
+        total = solid
+        if TWO_PHASE:
+            liquid = parameters.liquid_density * reference
+            momentum += liquid * V2(v[2], v[3])
+            energy += F(0.5) * liquid * (v[2] * v[2] + v[3] * v[3])
+            total += liquid
+            wp.atomic_add(left, wp.static(LEFT_LIQUID_MASS), wp.float64(liquid))
+        energy -= total * wp.dot(parameters.gravity, x)
+        wp.atomic_add(left, wp.static(LEFT_SOLID_MASS), wp.float64(solid))
+        wp.atomic_add(left, wp.static(LEFT_MOMENTUM_X), wp.float64(momentum[0]))
+        wp.atomic_add(left, wp.static(LEFT_MOMENTUM_Y), wp.float64(momentum[1]))
+        wp.atomic_add(left, wp.static(LEFT_ENERGY), wp.float64(energy))
+
     @wp.kernel(module=module)
-    def update(
+    def advect(
         points: Points,
         grid: Grid,
         parameters: Parameters,
@@ -128,127 +170,40 @@ def make_constitutive(
         counters: wp.array(dtype=wp.int32),
         left: wp.array(dtype=wp.float64),
     ):
+        """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
         p = wp.tid()
-        if points.inside[p] == 0:
+        if read(points.inside, p) == 0:
             return
         time_step = F(clock[wp.static(TIME_STEP)])
         shift = F(clock[wp.static(GRID_SHIFT)])
-        x = points.position[p]
-        gradient = points.gradient[p]
-        divergence = gradient[0] + gradient[3]
-        liquid_divergence = F(0.0)
-        if TWO_PHASE:
-            liquid_divergence = points.liquid_divergence[p]
-        smooth_excess = F(0.0)
-        smooth_residual = F(0.0)
-        filling = F(0.0)
-        least_filling = F(1.0)
+        x = read(points.position, p)
         if CORNERS:
             sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
             sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
             ci = wp.int32(sx)
             cj = wp.int32(sy)
+            first = (ci - 1) * parameters.rows + cj - 1
             hx = hats(sx - F(ci))
             hy = hats(sy - F(cj))
             smooth = S()
+            least_filling = F(1.0)
             for k in range(2):
                 for m in range(2):
-                    corner = grid.corner[ci - 1 + k, cj - 1 + m]
+                    corner = read(grid.corner, first + k * parameters.rows + m)
                     smooth += (hx[k] * hy[m]) * corner
-                    if RELAXATION:
-                        least_filling = wp.where(corner[0] < least_filling, corner[0], least_filling)
-            filling = smooth[0]
-            if SMOOTHING:
-                divergence = smooth[1]
-                if TWO_PHASE:
-                    liquid_divergence = smooth[4]
+                    least_filling = smaller(corner[0], least_filling)
             if RELAXATION:
-                smooth_excess = smooth[2]
-                smooth_residual = smooth[3]
-
-        if VISCOSITY:
-            # Artificial, linear (Landshoff), on compression only: keeps a front of sound from ringing.
-            mixture = divergence
-            if TWO_PHASE:
-                n = porosity(points.reference_volume[p], points.volume[p], parameters)
-                mixture = (F(1.0) - n) * divergence + n * liquid_divergence
-            points.viscous_pressure[p] = -parameters.bulk_viscosity * wp.min(mixture, F(0.0))
-
-        if DENSITY:
-            # What the points around claim over what there is; a flow that is compressed claims less.
-            stretch = gradient[0] - gradient[3]
-            shear = gradient[1] + gradient[2]
-            ratio = filling * points.volume[p] / points.reference_volume[p]
-            now = wp.clamp(ratio - F(1.0), -F(wp.static(WORST)), F(wp.static(WORST)))
-            crowding = points.crowding[p]
-            share = wp.min(time_step * wp.sqrt(stretch * stretch + shear * shear), F(1.0))
-            points.crowding[p] = crowding + share * (now - crowding)
-
-        volume_strain = divergence * time_step
-        borne = volume_strain
-        if PLASTICITY:
-            # A skeleton that has opened bears nothing until the gap has closed.
-            gap = points.solid_gap[p]
-            if gap > F(0.0):
-                if GAP_BOUND:
-                    largest = room(filling)
-                    if gap > largest:
-                        gap = largest
-                        wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
-                closed = wp.min(gap, wp.max(-borne, F(0.0)))
-                borne += closed
-                points.solid_gap[p] = gap - closed
-        stress, deviatoric = trial_stress(points.stress[p], gradient, borne, time_step, parameters)
-        points.stress[p] = stress
-        points.deviatoric_strain[p] += deviatoric
-        volume = points.volume[p] * volume_ratio(borne)
-        points.volume[p] = volume
-        grains = parameters.grain_share * points.reference_volume[p]
-        if volume < grains:
-            # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
-            v = points.velocity[p]
-            gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
-            speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
-            wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
-            wp.atomic_add(clock, wp.static(VOIDS_CLOSED), wp.float64(1.0))
-
-        if LIQUID:
-            # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
-            strain = points.liquid_strain[p]
-            if TWO_PHASE:
-                n = porosity(points.reference_volume[p], points.volume[p], parameters)
-                strain += time_step * ((F(1.0) - n) * divergence + n * liquid_divergence) / n
-            else:
-                strain += volume_strain / parameters.porosity
-            if RELAXATION:
-                # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
-                # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
-                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(
-                    parameters.gravity, x
-                )
-                residual = points.pressure_residual[p]
-                points.pressure_residual[p] = excess - smooth_excess
+                # With the part that was left out of the average.
+                smooth[2] += parameters.true_liquid_density * wp.dot(parameters.gravity, x)
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
-                surrounded = wp.where(least_filling > F(0.6), wp.int32(1), wp.int32(0))
-                points.surrounded[p] = surrounded
-                if surrounded == 1 and strain < F(0.0):
-                    share = wp.min(parameters.relaxation_rate * time_step, F(1.0))
-                    strain = wp.min(
-                        strain + share * (residual - smooth_residual) / parameters.liquid_bulk_modulus, F(0.0)
-                    )
-            if GAP_BOUND:
-                if strain > F(0.0):
-                    largest_strain = room(filling) / parameters.porosity
-                    if strain > largest_strain:
-                        strain = largest_strain
-                        wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
-            points.liquid_strain[p] = strain
+                write(points.surrounded, p, wp.where(least_filling > F(0.6), wp.int32(1), wp.int32(0)))
+            write(points.smooth, p, smooth)
 
         before = x
         if FLIP:
-            x += time_step * points.advection[p]
+            x += time_step * read(points.advection, p)
         else:
-            v = points.velocity[p]
+            v = read(points.velocity, p)
             x += time_step * V2(v[0], v[1])
         # Barrier and grid as they will lie in the next step: whatever their speed, no point then reaches beyond them.
         if MOVING:
@@ -272,7 +227,6 @@ def make_constitutive(
                     x[1] += depth - top
                 else:
                     x += (depth - back) * parameters.back_normal
-        points.position[p] = x
 
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
@@ -282,48 +236,119 @@ def make_constitutive(
         )
         if not within:
             # A position that is no number compares false above; such a point has not left, the run has diverged.
-            if not (wp.isfinite(x[0]) and wp.isfinite(x[1])):
-                points.position[p] = before
+            if wp.isfinite(x[0]) and wp.isfinite(x[1]):
+                leave(points, p, x, parameters, left)
+                wp.atomic_add(counters, wp.static(POINTS_LEFT), 1)
+            else:
+                x = before
                 counters[wp.static(DIVERGED)] = 1
-                return
-            points.inside[p] = 0
-            reference = points.reference_volume[p]
-            v = points.velocity[p]
-            solid = parameters.solid_density * reference
-            momentum = solid * V2(v[0], v[1])
-            energy = F(0.5) * solid * (v[0] * v[0] + v[1] * v[1])
-            total = solid
+        write(points.position, p, x)
+
+        if SOLID_GAP:
+            gap = read(points.solid_gap, p)
+            if gap > F(0.0):
+                largest = room(read(points.smooth, p)[0])
+                if gap > largest:
+                    write(points.solid_gap, p, largest)
+                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+
+    @wp.kernel(module=module)
+    def update(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+        """Strains, effective stress and pore pressure from the rates at the point, time step by time step."""
+        p = wp.tid()
+        time_step = F(clock[wp.static(TIME_STEP)])
+        gradient = read(points.gradient, p)
+        divergence = gradient[0] + gradient[3]
+        smooth = S()
+        if CORNERS:
+            smooth = read(points.smooth, p)
+        reference = read(points.reference_volume, p)
+        volume = read(points.volume, p)
+        n = F(0.0)
+        if LIQUID:
+            n = parameters.porosity
+        if TWO_PHASE:
+            n = porosity(reference, volume, parameters)
+        liquid_divergence = F(0.0)
+        if SMOOTHING:
+            divergence = smooth[1]
             if TWO_PHASE:
-                liquid = parameters.liquid_density * reference
-                momentum += liquid * V2(v[2], v[3])
-                energy += F(0.5) * liquid * (v[2] * v[2] + v[3] * v[3])
-                total += liquid
-                wp.atomic_add(left, wp.static(LEFT_LIQUID_MASS), wp.float64(liquid))
-            energy -= total * wp.dot(parameters.gravity, x)
-            wp.atomic_add(left, wp.static(LEFT_SOLID_MASS), wp.float64(solid))
-            wp.atomic_add(left, wp.static(LEFT_MOMENTUM_X), wp.float64(momentum[0]))
-            wp.atomic_add(left, wp.static(LEFT_MOMENTUM_Y), wp.float64(momentum[1]))
-            wp.atomic_add(left, wp.static(LEFT_ENERGY), wp.float64(energy))
-            wp.atomic_add(counters, wp.static(POINTS_LEFT), 1)
+                liquid_divergence = smooth[4]
+        if OWN_DIVERGENCE:
+            liquid_divergence = read(points.liquid_divergence, p)
 
-    kernels = SimpleNamespace(update=update)
+        if VISCOSITY:
+            # Artificial, linear (Landshoff), on compression only: keeps a front of sound from ringing.
+            mixture = divergence
+            if TWO_PHASE:
+                mixture = (F(1.0) - n) * divergence + n * liquid_divergence
+            write(points.viscous_pressure, p, -parameters.bulk_viscosity * smaller(mixture, F(0.0)))
 
-    if PLASTICITY:
-        return_mapping = make_return_mapping(types)
+        if DENSITY:
+            # What the points around claim over what there is; a flow that is compressed claims less.
+            stretch = gradient[0] - gradient[3]
+            shear = gradient[1] + gradient[2]
+            ratio = smooth[0] * volume / reference
+            now = larger(smaller(ratio - F(1.0), F(wp.static(WORST))), -F(wp.static(WORST)))
+            crowding = read(points.crowding, p)
+            share = smaller(time_step * wp.sqrt(stretch * stretch + shear * shear), F(1.0))
+            write(points.crowding, p, crowding + share * (now - crowding))
 
-        @wp.kernel(module=module)
-        def plasticity(points: Points, parameters: Parameters):
-            """Bring the stress back to the yield surface. Apart from `update`, the processor overlaps more points."""
-            p = wp.tid()
-            if points.inside[p] == 0:
-                return
-            stress, opening = return_mapping(points.stress[p], parameters)
-            points.stress[p] = stress
-            if opening > F(0.0):
-                points.volume[p] = points.volume[p] * (F(1.0) - opening)
-                # As a strain, -ln(1 - opening), so that the reverse strain closes the gap.
-                points.solid_gap[p] += opening / (F(1.0) - F(0.5) * opening)
+        volume_strain = divergence * time_step
+        borne = volume_strain
+        gap = F(0.0)
+        if PLASTICITY:
+            # A skeleton that has opened bears nothing until the gap has closed.
+            gap = read(points.solid_gap, p)
+            closed = smaller(gap, larger(-borne, F(0.0)))
+            borne += closed
+            gap -= closed
+        stress, deviatoric = trial_stress(read(points.stress, p), gradient, borne, time_step, parameters)
+        write(points.deviatoric_strain, p, read(points.deviatoric_strain, p) + deviatoric)
+        volume *= volume_ratio(borne)
+        if LIQUID:
+            # Eq. (A12); the strain is a record of volume, so a gap that has opened must close before pressure builds.
+            strain = read(points.liquid_strain, p)
+            if TWO_PHASE:
+                n = porosity(reference, volume, parameters)
+                strain += time_step * ((F(1.0) - n) * divergence + n * liquid_divergence) / n
+            else:
+                strain += volume_strain / parameters.porosity
+            if RELAXATION:
+                # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
+                # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
+                share = smaller(parameters.relaxation_rate * time_step, F(1.0))
+                correction = share * (read(points.pressure_residual, p) - smooth[3]) / parameters.liquid_bulk_modulus
+                write(points.pressure_residual, p, pressure_at(read(points.liquid_strain, p), parameters) - smooth[2])
+                filtered = wp.where(strain < F(0.0), smaller(strain + correction, F(0.0)), strain)
+                strain = wp.where(read(points.surrounded, p) == 1, filtered, strain)
+            write(points.liquid_strain, p, strain)
+        if PLASTICITY:
+            stress, opening = return_mapping(stress, parameters)
+            volume *= F(1.0) - opening
+            # As a strain, -ln(1 - opening), so that the reverse strain closes the gap.
+            write(points.solid_gap, p, gap + opening / (F(1.0) - F(0.5) * opening))
+        write(points.stress, p, stress)
+        write(points.volume, p, volume)
 
-        kernels.plasticity = plasticity
+    @wp.kernel(module=module)
+    def bound(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+        """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
+        p = wp.tid()
+        grains = parameters.grain_share * read(points.reference_volume, p)
+        volume = read(points.volume, p)
+        if volume < grains and read(points.inside, p) == 1:
+            # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
+            v = read(points.velocity, p)
+            gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
+            speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
+            wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
+            wp.atomic_add(clock, wp.static(VOIDS_CLOSED), wp.float64(1.0))
+        if LIQUID_GAP:
+            if read(points.liquid_strain, p) > F(0.0):
+                largest = room(read(points.smooth, p)[0]) / parameters.porosity
+                if read(points.liquid_strain, p) > largest:
+                    write(points.liquid_strain, p, largest)
+                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
-    return kernels
+    return SimpleNamespace(advect=advect, update=update, bound=bound)

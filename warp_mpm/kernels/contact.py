@@ -24,7 +24,7 @@ from .layout import (
 )
 
 
-def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build those of the kernels `ground` (workers on the blocks in use), `side_walls` (over rows), `ceiling` (over
     columns), `collect` and `barrier` (over
     contacts) that are called for, and the functions `respond` and `impulse` for the barrier's equation of motion."""
@@ -35,7 +35,6 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
     Grid = types.Grid
     Parameters = types.Parameters
     Contact = types.Contact
-    free_velocity = momentum.free_velocity
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
@@ -43,18 +42,6 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
     BARRIER_CARRIED = effects.barrier_friction and LIQUID
     GROUND_CARRIED = effects.ground == "frictional" and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
-    PORE_FORCE = effects.effective_contact_force
-
-    @wp.func
-    def liquid_alone(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V2:
-        """Velocity of the liquid at a node under its own pressure and gravity alone."""
-        result = V2()
-        if TWO_PHASE:
-            free = free_velocity(grid, parameters, i, j, time_step)
-            result = V2(free[2], free[3])
-        elif PORE_FORCE:
-            result = free_velocity(grid, parameters, i, j, time_step) + grid.liquid_surplus[i, j] / grid.mass[i, j]
-        return result
 
     @wp.func
     def respond(
@@ -175,7 +162,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
             velocity = grid.velocity[i, j]
             liquid_free = V2()
             if GROUND_CARRIED:
-                liquid_free = liquid_alone(grid, parameters, i, j, time_step)
+                liquid_free = grid.liquid_alone[i, j]
             pair = wp.bool(False)
             if mi != i or mj != j:
                 other = grid.mass[mi, mj]
@@ -186,7 +173,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                         pair = wp.bool(True)
                         both = F(4.0) * mass * other / (mass + other)
                         if GROUND_CARRIED:
-                            liquid_free = F(0.5) * (liquid_free + liquid_alone(grid, parameters, mi, mj, time_step))
+                            liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mi, mj])
                         change = respond(both, mean, liquid_free, normal, friction, V2(), parameters, time_step)
                         add(grid, i, j, change * (F(0.5) * both / mass))
                         add(grid, mi, mj, change * (F(0.5) * both / other))
@@ -293,7 +280,6 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
         def collect(contact: Contact, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
             """What the barrier's surface sees of the flow: inertia (zero: nothing there) and velocities."""
             e = wp.tid()
-            time_step = F(clock[wp.static(TIME_STEP)])
             node = contact.node[e]
             mirror = contact.mirror[e]
             mass = grid.mass[node[0], node[1]]
@@ -301,7 +287,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                 velocity = grid.velocity[node[0], node[1]]
                 liquid_free = V2()
                 if BARRIER_CARRIED:
-                    liquid_free = liquid_alone(grid, parameters, node[0], node[1], time_step)
+                    liquid_free = grid.liquid_alone[node[0], node[1]]
                 pair = wp.int32(0)
                 if mirror[0] >= 0:
                     other = grid.mass[mirror[0], mirror[1]]
@@ -314,9 +300,7 @@ def make_contact(types: SimpleNamespace, momentum: SimpleNamespace, module: str)
                             mass = F(4.0) * mass * other / (mass + other)
                             velocity = mean
                             if BARRIER_CARRIED:
-                                liquid_free = F(0.5) * (
-                                    liquid_free + liquid_alone(grid, parameters, mirror[0], mirror[1], time_step)
-                                )
+                                liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mirror[0], mirror[1]])
                 contact.pair[e] = pair
                 contact.velocity[e] = velocity
                 if BARRIER_CARRIED:

@@ -8,10 +8,10 @@ from .layout import BLOCK, TIME_STEP
 
 
 def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernel `move` (workers on the blocks in use) and the function `free_velocity` (before contact and
-    implicit drag)."""
+    """Build the kernel `move` (workers on the blocks in use)."""
     effects = types.effects
     F = types.scalar
+    V2 = types.V2
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
@@ -19,12 +19,13 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     POROSITY = effects.porosity_update
     FLIP = effects.transfer == "flip"
+    LIQUID_ALONE = effects.effective_contact_force
 
     @wp.func
     def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:
-        """Velocities at the end of the step under internal forces and gravity alone."""
+        """Velocities at the end of the step under internal forces and gravity alone, from the momentum."""
         inverse = F(1.0) / grid.mass[i, j]
-        result = grid.momentum[i, j] * inverse
+        result = grid.velocity[i, j] * inverse
         if FLIP:
             force = grid.force[i, j]
             g = parameters.gravity
@@ -56,7 +57,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def move(grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """Velocity (with FLIP: and its increment) of every node in use."""
+        """From the momentum of every node in use to its velocity (with FLIP: and the increment of that)."""
         worker = wp.tid()
         time_step = F(clock[wp.static(TIME_STEP)])
         for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
@@ -68,7 +69,13 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
+                    old = grid.velocity[i, j] / mass
                     new = free_velocity(grid, parameters, i, j, time_step)
+                    if LIQUID_ALONE:
+                        if TWO_PHASE:
+                            grid.liquid_alone[i, j] = V2(new[2], new[3])
+                        else:
+                            grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if TWO_PHASE:
                         coefficient = F(1.0)
                         if POROSITY:
@@ -76,6 +83,6 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                         new = dragged(new, coefficient, parameters, time_step)
                     grid.velocity[i, j] = new
                     if FLIP:
-                        grid.increment[i, j] = new - grid.momentum[i, j] / mass
+                        grid.increment[i, j] = new - old
 
-    return SimpleNamespace(move=move, free_velocity=free_velocity)
+    return SimpleNamespace(move=move)

@@ -16,7 +16,8 @@ import warp as wp
 
 from ..effects import Effects
 
-BLOCK = 8
+BLOCK_SHIFT = 3
+BLOCK = 1 << BLOCK_SHIFT
 """Nodes along the side of a block, the unit in which the grid is switched on and off."""
 
 # Entries of the clock, a float64 array: the state of time, of the grid and of the barrier that lives on the device.
@@ -143,6 +144,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["solid_gap"] = array(dtype=scalar)
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
+    if effects.smoothing_grid:
+        points["smooth"] = array(dtype=S)  # the corners' averages at the point
     if effects.density_correction:
         points["crowding"] = array(dtype=scalar)  # volume over room, less 1: a mean over the last unit of shear strain
     if effects.pressure_relaxation:
@@ -150,13 +153,12 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["surrounded"] = array(dtype=wp.int32)  # 1: the corners around are filled, so that the filter acts
     if effects.bulk_viscosity:
         points["viscous_pressure"] = array(dtype=scalar)
-    if effects.two_phase:
+    if effects.two_phase and not effects.volumetric_smoothing:
         points["liquid_divergence"] = array(dtype=scalar)
 
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),
-        "momentum": array(dtype=V, ndim=2),
-        "velocity": array(dtype=V, ndim=2),
+        "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
@@ -167,7 +169,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.porosity_update:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient times volume
     if effects.effective_contact_force:
-        grid["liquid_surplus"] = array(dtype=V2, ndim=2)  # momentum that the liquid alone would have gained beyond
+        # Velocity that the liquid would have alone, until `move`: its momentum beyond that of the mixture.
+        grid["liquid_alone"] = array(dtype=V2, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.smoothing_grid:

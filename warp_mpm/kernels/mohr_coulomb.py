@@ -6,6 +6,8 @@ from typing import Any
 
 import warp as wp
 
+from .elementary import make_elementary
+
 
 def make_return_mapping(types: SimpleNamespace) -> Any:
     """Build the Warp function that maps a trial stress back onto the yield surface.
@@ -28,11 +30,8 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
     V3 = types.V3
     V4 = types.V4
     Parameters = types.Parameters
-
-    @wp.func
-    def larger(a: F, b: F) -> F:
-        # One instruction, where wp.max takes five to order NaN.
-        return wp.where(a > b, a, b)
+    elementary = make_elementary(types)
+    larger, smaller = elementary.larger, elementary.smaller
 
     @wp.func
     def cone(s: V3, y: Parameters) -> V3:
@@ -57,14 +56,14 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
         r = V3(limit, s[1] - y.lame * excess, s[2] - y.lame * excess)
         if r[1] > limit:
             both = (s[0] + s[1] - F(2.0) * limit) / (F(2.0) * (y.lame + y.shear_modulus))
-            r = V3(limit, limit, wp.min(s[2] - y.lame * both, limit))
+            r = V3(limit, limit, smaller(s[2] - y.lame * both, limit))
         if y.yield_plus * limit - y.yield_minus * r[2] > y.cohesion_term:
             # Cut-off and cone together: s1 and s3 are known, s2 follows from elasticity, unless it meets a corner.
             low = (y.yield_plus * limit - y.cohesion_term) / y.yield_minus
             inverse = F(1.0) / (stiff * y.flow_down - y.lame * y.flow_up)
             a = ((s[0] - limit) * y.flow_down - (s[2] - low) * y.flow_up) * inverse
             m = (stiff * (s[2] - low) - y.lame * (s[0] - limit)) * inverse
-            r = V3(limit, wp.clamp(s[1] - y.lame * a - y.flow_side * m, low, limit), low)
+            r = V3(limit, larger(smaller(s[1] - y.lame * a - y.flow_side * m, limit), low), low)
         return r
 
     @wp.func

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from .elementary import make_elementary
+
 LEAST_POROSITY = 0.01
 """Porosity below which a crushed skeleton's voids are not followed."""
 
@@ -13,19 +15,20 @@ def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
     F = types.scalar
     Parameters = types.Parameters
     POROSITY = types.effects.porosity_update
+    larger = make_elementary(types).larger
 
     @wp.func
     def pressure(strain: F, parameters: Parameters) -> F:
         """Pressure [Pa], compression positive, at the recorded volume strain [-]; no tension beyond cavitation, from
         where on the strain is the record of a gap."""
-        return wp.max(-parameters.liquid_bulk_modulus * strain, -parameters.cavitation_pressure)
+        return larger(-parameters.liquid_bulk_modulus * strain, -parameters.cavitation_pressure)
 
     @wp.func
     def porosity(reference: F, volume: F, parameters: Parameters) -> F:
         """Porosity now: Dn/Dt = n_S div v_S, of which Eq. (A11) keeps only the zero; the grains keep their volume."""
         result = parameters.porosity
         if POROSITY:
-            result = wp.max(F(1.0) - (F(1.0) - parameters.porosity) * reference / volume, F(wp.static(LEAST_POROSITY)))
+            result = larger(F(1.0) - (F(1.0) - parameters.porosity) * reference / volume, F(wp.static(LEAST_POROSITY)))
         return result
 
     return SimpleNamespace(pressure=pressure, porosity=porosity)

@@ -4,8 +4,10 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from .elementary import make_elementary
 from .layout import (
     BLOCK,
+    BLOCK_SHIFT,
     GRID_SHIFT,
     SPEED_MAX,
     TIME_STEP,
@@ -32,6 +34,8 @@ def make_transfer(
     weights = shapes.weights
     slopes = shapes.slopes
     hats = shapes.hats
+    elementary = make_elementary(types)
+    read, write, add, larger = elementary.read, elementary.write, elementary.add, elementary.larger
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -41,10 +45,11 @@ def make_transfer(
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
-    PORE_FORCE = effects.effective_contact_force
+    PORE_FORCE = effects.effective_contact_force and not TWO_PHASE
     GROUND_FRICTION = effects.ground == "frictional"
     BARRIER_FRICTION = effects.barrier_friction
     POROSITY = effects.porosity_update
+    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     pressure_at = pore.pressure
     porosity = pore.porosity
 
@@ -62,11 +67,11 @@ def make_transfer(
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 grid.mass[i, j] = F(0.0)
-                grid.momentum[i, j] = V()
+                grid.velocity[i, j] = V()
                 if FLIP:
                     grid.force[i, j] = V()
                 if PORE_FORCE:
-                    grid.liquid_surplus[i, j] = V2()
+                    grid.liquid_alone[i, j] = V2()
                 if POROSITY:
                     grid.drag[i, j] = F(0.0)
                 if CORNERS:
@@ -78,11 +83,14 @@ def make_transfer(
         grid.active_count[0] = 0
 
     @wp.func
-    def mark(grid: Grid, parameters: Parameters, bi: wp.int32, bj: wp.int32):
-        if grid.block[bi, bj] == 0:
+    def mark(grid: Grid, block: wp.int32, parameters: Parameters):
+        """Add a block to the list of those in use, unless it is there."""
+        if read(grid.block, block) == 0:
+            bi = block / parameters.block_rows
+            bj = block - bi * parameters.block_rows
             if wp.atomic_cas(grid.block, bi, bj, 0, 1) == 0:
                 place = wp.atomic_add(grid.active_count, 0, 1)
-                grid.active[place] = bi * parameters.block_rows + bj
+                grid.active[place] = block
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
@@ -92,25 +100,26 @@ def make_transfer(
         compression positive: audit 3.4, action and reaction between the phases included.
         """
         p = wp.tid()
-        if points.inside[p] == 0:
+        if read(points.inside, p) == 0:
             return
-        x = points.position[p]
+        x = read(points.position, p)
         shift = F(clock[wp.static(GRID_SHIFT)])
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         ci = wp.int32(sx)
         cj = wp.int32(sy)
+        first = (ci - 1) * parameters.rows + cj - 1
         fx = sx - F(ci)
         fy = sy - F(cj)
         wx = weights(fx)
         wy = weights(fy)
-        dx = slopes(fx) * parameters.inverse_spacing
-        dy = slopes(fy) * parameters.inverse_spacing
-        reference = points.reference_volume[p]
+        dx = slopes(fx)
+        dy = slopes(fy)
+        reference = read(points.reference_volume, p)
         # Grains do not give way: once the voids are closed the same pressure acts on their volume, not on less.
-        volume = wp.max(points.volume[p], parameters.grain_share * reference)
-        stress = points.stress[p]
-        velocity = points.velocity[p] * reference
+        volume = larger(read(points.volume, p), parameters.grain_share * reference)
+        stress = read(points.stress, p)
+        velocity = read(points.velocity, p) * reference
         time_step = F(clock[wp.static(TIME_STEP)])
         gravity = V()
         if TWO_PHASE:
@@ -118,37 +127,38 @@ def make_transfer(
         else:
             gravity = V(parameters.gravity[0], parameters.gravity[1])
 
-        block_left = (ci - 1) / wp.static(BLOCK)
-        block_right = (ci + 1) / wp.static(BLOCK)
-        block_low = (cj - 1) / wp.static(BLOCK)
-        block_high = (cj + 1) / wp.static(BLOCK)
-        mark(grid, parameters, block_left, block_low)
-        mark(grid, parameters, block_right, block_low)
-        mark(grid, parameters, block_left, block_high)
-        mark(grid, parameters, block_right, block_high)
+        left = ((ci - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = ((ci + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        low = (cj - 1) >> wp.static(BLOCK_SHIFT)
+        high = (cj + 1) >> wp.static(BLOCK_SHIFT)
+        mark(grid, left + low, parameters)
+        mark(grid, right + low, parameters)
+        mark(grid, left + high, parameters)
+        mark(grid, right + high, parameters)
 
         pressure = F(0.0)
         if LIQUID:
-            pressure = pressure_at(points.liquid_strain[p], parameters)
+            pressure = pressure_at(read(points.liquid_strain, p), parameters)
         if VISCOSITY:
-            pressure += points.viscous_pressure[p]
+            pressure += read(points.viscous_pressure, p)
         solid_pressure = pressure
         liquid_force = F(0.0)
         if TWO_PHASE:
             n = porosity(reference, volume, parameters)
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
-        push = volume
+        push = volume * parameters.inverse_spacing
+        liquid_force *= parameters.inverse_spacing
         if APIC:
             # The nodes receive the momentum at the end of the step: the force's share of it rides along.
-            push = volume * time_step / parameters.solid_density
+            push *= time_step / parameters.solid_density
             velocity += reference * time_step * gravity
             if TWO_PHASE:
                 liquid_force *= time_step / parameters.liquid_density
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push
-        # Force on a node: force_x times the weight's slope along x, plus force_y times that along y.
+        # Force on a node: force_x times the weight's slope (per cell) along x, plus force_y times that along y.
         force_x = V()
         force_y = V()
         if TWO_PHASE:
@@ -157,18 +167,54 @@ def make_transfer(
         else:
             force_x = V(xx, xy)
             force_y = V(xy, yy)
-        alone = F(0.0)
-        share = F(1.0)
-        rubbed = wp.int32(0)
+        # The velocity that the point's affine field has at the middle node, and its change from there to the next.
+        middle = velocity
+        change_x = V()
+        change_y = V()
+        if APIC:
+            change_x = read(points.affine_x, p) * (parameters.spacing * reference)
+            change_y = read(points.affine_y, p) * (parameters.spacing * reference)
+            middle += (F(0.5) - fx) * change_x + (F(0.5) - fy) * change_y
+
+        # What depends on x alone is formed once per column of nodes.
+        for k in range(3):
+            there = middle
+            if k == 0:
+                there = middle - change_x
+            if k == 2:
+                there = middle + change_x
+            column = wx[k] * there
+            column_force = dx[k] * force_x
+            if APIC:
+                column += column_force
+            column_slope = wx[k] * force_y
+            column_change = wx[k] * change_y
+            column_mass = wx[k] * reference
+            for m in range(3):
+                node = first + k * parameters.rows + m
+                add(grid.mass, node, wy[m] * column_mass)
+                if POROSITY:
+                    # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
+                    ratio = n / parameters.porosity
+                    add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
+                value = column
+                if APIC:
+                    if m == 0:
+                        value = column - column_change
+                    if m == 2:
+                        value = column + column_change
+                    add(grid.velocity, node, wy[m] * value + dy[m] * column_slope)
+                else:
+                    add(grid.velocity, node, wy[m] * value)
+                    add(grid.force, node, wy[m] * column_force + dy[m] * column_slope)
+
         if PORE_FORCE:
-            alone = pressure * volume * time_step / parameters.true_liquid_density
-            if FLIP:
-                share = time_step / parameters.solid_density
+            rubbed = wp.bool(False)
             # Only nodes of a surface that rubs read the surplus. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
             if GROUND_FRICTION:
                 if cj - 2 <= parameters.ground_row:
-                    rubbed = wp.int32(1)
+                    rubbed = wp.bool(True)
             if BARRIER_FRICTION:
                 seen = x - V2(shift, F(0.0))
                 reach = F(3.0) * parameters.spacing
@@ -177,111 +223,82 @@ def make_transfer(
                     and seen[1] - parameters.crest_height < reach
                     and wp.dot(parameters.back_normal, seen) - parameters.back_offset < reach
                 ):
-                    rubbed = wp.int32(1)
-        to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
-        to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
-        affine_x = V()
-        affine_y = V()
-        if APIC:
-            affine_x = points.affine_x[p] * (parameters.spacing * reference)
-            affine_y = points.affine_y[p] * (parameters.spacing * reference)
+                    rubbed = wp.bool(True)
+            if rubbed:
+                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.true_liquid_density
+                share = F(1.0)
+                if FLIP:
+                    share = time_step / parameters.solid_density
+                along_x = V2(alone, F(0.0)) - share * force_x
+                along_y = V2(F(0.0), alone) - share * force_y
+                for k in range(3):
+                    for m in range(3):
+                        surplus = (dx[k] * wy[m]) * along_x + (wx[k] * dy[m]) * along_y
+                        add(grid.liquid_alone, first + k * parameters.rows + m, surplus)
 
-        # What depends on x alone is formed once per column of nodes.
-        for k in range(3):
-            i = ci + (k - 1)
-            column_mass = wx[k] * reference
-            column_force = dx[k] * force_x
-            column_slope = wx[k] * force_y
-            column_velocity = wx[k] * velocity
-            column_affine = V()
-            if APIC:
-                column_velocity = wx[k] * (velocity + to_x[k] * affine_x) + column_force
-                column_affine = wx[k] * affine_y
-            for m in range(3):
-                j = cj + (m - 1)
-                grid.mass[i, j] += wy[m] * column_mass
-                if POROSITY:
-                    # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
-                    ratio = n / parameters.porosity
-                    grid.drag[i, j] += wy[m] * column_mass * ratio * ratio
-                if APIC:
-                    grid.momentum[i, j] += (
-                        wy[m] * column_velocity + (wy[m] * to_y[m]) * column_affine + dy[m] * column_slope
-                    )
-                else:
-                    grid.momentum[i, j] += wy[m] * column_velocity
-                    grid.force[i, j] += wy[m] * column_force + dy[m] * column_slope
-                if PORE_FORCE:
-                    if rubbed == 1:
-                        gx = dx[k] * wy[m]
-                        gy = wx[k] * dy[m]
-                        along_x = V2(alone, F(0.0)) - share * force_x
-                        along_y = V2(F(0.0), alone) - share * force_y
-                        grid.liquid_surplus[i, j] += gx * along_x + gy * along_y
+    @wp.func
+    def mean(w: V3, low: V, middle: V, high: V) -> V:
+        return w[0] * low + w[1] * middle + w[2] * high
+
+    @wp.func
+    def line(w: V3, f: F, low: V, middle: V, high: V):
+        """Of a field at three nodes in a row: its weighted mean, its first moment about the middle one and its slope,
+        both in cells."""
+        first = w[0] * low
+        last = w[2] * high
+        slope = (F(1.0) - f) * (middle - low) + f * (high - middle)
+        return first + w[1] * middle + last, last - first, slope
 
     @wp.func
     def speed_squared(velocity: V) -> wp.float64:
         """Of the faster phase [m2/s2]."""
         result = velocity[0] * velocity[0] + velocity[1] * velocity[1]
         if TWO_PHASE:
-            result = wp.max(result, velocity[2] * velocity[2] + velocity[3] * velocity[3])
+            result = larger(result, velocity[2] * velocity[2] + velocity[3] * velocity[3])
         return wp.float64(result)
 
     @wp.kernel(module=module)
     def gather(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
         """Velocities and velocity gradient from the nodes to the points; volume strain rates to the corners."""
         p = wp.tid()
-        if points.inside[p] == 0:
+        if read(points.inside, p) == 0:
             return
-        x = points.position[p]
+        x = read(points.position, p)
         shift = F(clock[wp.static(GRID_SHIFT)])
         time_step = F(clock[wp.static(TIME_STEP)])
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         ci = wp.int32(sx)
         cj = wp.int32(sy)
+        first = (ci - 1) * parameters.rows + cj - 1
         fx = sx - F(ci)
         fy = sy - F(cj)
         wx = weights(fx)
         wy = weights(fy)
-        dx = slopes(fx) * parameters.inverse_spacing
-        dy = slopes(fy) * parameters.inverse_spacing
 
-        to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
-        to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
-        smooth = V()
-        increment = V()
-        along_x = V()
-        along_y = V()
-        affine_x = V()
-        affine_y = V()
-        for k in range(3):
-            i = ci + (k - 1)
-            column = V()
-            column_increment = V()
-            column_slope = V()
-            column_affine = V()
-            for m in range(3):
-                j = cj + (m - 1)
-                v = grid.velocity[i, j]
-                column += wy[m] * v
-                column_slope += dy[m] * v
-                if FLIP:
-                    column_increment += wy[m] * grid.increment[i, j]
-                else:
-                    column_affine += (wy[m] * to_y[m]) * v
-            smooth += wx[k] * column
-            along_x += dx[k] * column
-            along_y += wx[k] * column_slope
-            if FLIP:
-                increment += wx[k] * column_increment
-            else:
-                affine_x += (wx[k] * to_x[k]) * column
-                affine_y += wx[k] * column_affine
+        # Along each of the three columns of nodes first, then across.
+        second = first + parameters.rows
+        third = second + parameters.rows
+        left, left_lean, left_slope = line(
+            wy, fy, read(grid.velocity, first), read(grid.velocity, first + 1), read(grid.velocity, first + 2)
+        )
+        centre, centre_lean, centre_slope = line(
+            wy, fy, read(grid.velocity, second), read(grid.velocity, second + 1), read(grid.velocity, second + 2)
+        )
+        right, right_lean, right_slope = line(
+            wy, fy, read(grid.velocity, third), read(grid.velocity, third + 1), read(grid.velocity, third + 2)
+        )
+        smooth, lean_x, slope_x = line(wx, fx, left, centre, right)
+        along_x = slope_x * parameters.inverse_spacing
+        along_y = mean(wx, left_slope, centre_slope, right_slope) * parameters.inverse_spacing
 
         if FLIP:
+            increment = V()
+            for k in range(3):
+                for m in range(3):
+                    increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
             pic = wp.min(parameters.pic_rate * time_step, F(1.0))
-            old = points.velocity[p]
+            old = read(points.velocity, p)
             new = old + increment + pic * (smooth - old - increment)
             if TWO_PHASE:
                 # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
@@ -296,25 +313,29 @@ def make_transfer(
                     new[0] + smooth[2] - smooth[0] + decay * unseen[0],
                     new[1] + smooth[3] - smooth[1] + decay * unseen[1],
                 )
-            points.velocity[p] = new
-            points.advection[p] = V2(smooth[0], smooth[1])
+            write(points.velocity, p, new)
+            write(points.advection, p, V2(smooth[0], smooth[1]))
             fastest = speed_squared(new)
         else:
-            points.velocity[p] = smooth
-            points.affine_x[p] = affine_x * (F(4.0) * parameters.inverse_spacing)
-            points.affine_y[p] = affine_y * (F(4.0) * parameters.inverse_spacing)
+            write(points.velocity, p, smooth)
+            # Moments about the point, not about the middle node.
+            lean_x += (F(0.5) - fx) * smooth
+            lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
+            write(points.affine_x, p, lean_x * (F(4.0) * parameters.inverse_spacing))
+            write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
             fastest = speed_squared(smooth)
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
         if fastest > clock[wp.static(SPEED_MAX)]:
             wp.atomic_max(clock, wp.static(SPEED_MAX), fastest)
 
         # Gradient entries: dvx/dx, dvx/dy, dvy/dx, dvy/dy of the solid.
-        points.gradient[p] = V4(along_x[0], along_y[0], along_x[1], along_y[1])
+        write(points.gradient, p, V4(along_x[0], along_y[0], along_x[1], along_y[1]))
         divergence = along_x[0] + along_y[1]
         liquid_divergence = F(0.0)
         if TWO_PHASE:
             liquid_divergence = along_x[2] + along_y[3]
-            points.liquid_divergence[p] = liquid_divergence
+        if OWN_DIVERGENCE:
+            write(points.liquid_divergence, p, liquid_divergence)
         if DENSITY:
             # Beyond what a regular arrangement of points varies by, crowding counts as compression (of both phases), at
             # the rate of the shearing that brings it about; the corners' averages keep the pressures smooth.
@@ -323,34 +344,33 @@ def make_transfer(
             squeeze = (
                 parameters.density_correction
                 * wp.sqrt(stretch * stretch + shear * shear)
-                * wp.max(points.crowding[p] - F(wp.static(EVEN)), F(0.0))
+                * larger(read(points.crowding, p) - F(wp.static(EVEN)), F(0.0))
             )
             divergence -= squeeze
             liquid_divergence -= squeeze
         if CORNERS:
             hx = hats(fx)
             hy = hats(fy)
-            reference = points.reference_volume[p]
+            reference = read(points.reference_volume, p)
             excess = F(0.0)
             residual = F(0.0)
             if RELAXATION:
-                if points.surrounded[p] == 1:
-                    residual = points.pressure_residual[p]
+                if read(points.surrounded, p) == 1:
+                    residual = read(points.pressure_residual, p)
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
-                excess = pressure_at(points.liquid_strain[p], parameters) - parameters.true_liquid_density * wp.dot(
-                    parameters.gravity, x
-                )
+                excess = pressure_at(read(points.liquid_strain, p), parameters)
+                excess -= parameters.true_liquid_density * wp.dot(parameters.gravity, x)
             for k in range(2):
                 for m in range(2):
                     h = hx[k] * hy[m] * reference
+                    corner = first + k * parameters.rows + m
                     if TWO_PHASE:
-                        grid.corner[ci - 1 + k, cj - 1 + m] += S(
-                            h, h * divergence, h * excess, h * residual, h * liquid_divergence
-                        )
+                        sums = S(h, h * divergence, h * excess, h * residual, h * liquid_divergence)
+                        add(grid.corner, corner, sums)
                     elif LIQUID:
-                        grid.corner[ci - 1 + k, cj - 1 + m] += S(h, h * divergence, h * excess, h * residual)
+                        add(grid.corner, corner, S(h, h * divergence, h * excess, h * residual))
                     else:
-                        grid.corner[ci - 1 + k, cj - 1 + m] += S(h, h * divergence)
+                        add(grid.corner, corner, S(h, h * divergence))
 
     kernels = SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
 

@@ -1,0 +1,48 @@
+"""Elementary operations in the form that a compiler can turn into vector instructions.
+
+A loop over the points is vectorised when its addresses are plain multiples of the index and nothing that it writes
+could change them. Warp's own `array[p]` lets a negative index count from the end, and writes a vector as one block of
+bytes, which might be anything; both stand in the way. The arrays of the points are contiguous, p is never negative.
+"""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+
+def make_elementary(types: SimpleNamespace) -> SimpleNamespace:
+    """Build `read(array, p)`, `write(array, p, value)`, `add(array, p, value)` (atomic on a GPU), `larger(a, b)` and
+    `smaller(a, b)`. In an array of two dimensions p counts through, row by row."""
+    F = types.scalar
+    forms = {number: ("array.data[p] = value;", "wp::atomic_add(&array.data[p], value);") for number in (F, wp.int32)}
+    for vector in (types.V2, types.V4, types.V, types.S):
+        each = f"for (int k = 0; k < {vector._length_}; ++k) "
+        forms[vector] = (
+            each + "array.data[p].c[k] = value.c[k];",
+            each + "wp::atomic_add(&array.data[p].c[k], value.c[k]);",
+        )
+
+    # Each round adds an overload.
+    for element, (written, added) in forms.items():
+        for dimensions in (1, 2):
+            stored = wp.array(dtype=element, ndim=dimensions)
+
+            @wp.func_native("return array.data[p];")
+            def read(array: stored, p: wp.int32) -> element: ...
+
+            @wp.func_native(written)
+            def write(array: stored, p: wp.int32, value: element): ...
+
+            @wp.func_native(added)
+            def add(array: stored, p: wp.int32, value: element): ...
+
+    # One instruction each, where wp.max and wp.min take five to order NaN.
+    @wp.func
+    def larger(a: F, b: F) -> F:
+        return wp.where(a > b, a, b)
+
+    @wp.func
+    def smaller(a: F, b: F) -> F:
+        return wp.where(a < b, a, b)
+
+    return SimpleNamespace(read=read, write=write, add=add, larger=larger, smaller=smaller)
