@@ -37,12 +37,14 @@ def make_elementary(types: SimpleNamespace) -> SimpleNamespace:
             def add(array: stored, p: wp.int32, value: element): ...
 
     # One instruction each, where wp.max and wp.min take five to order NaN.
-    @wp.func
-    def larger(a: F, b: F) -> F:
-        return wp.where(a > b, a, b)
+    for number in dict.fromkeys((F, wp.float64)):
 
-    @wp.func
-    def smaller(a: F, b: F) -> F:
-        return wp.where(a < b, a, b)
+        @wp.func
+        def larger(a: number, b: number) -> number:
+            return wp.where(a > b, a, b)
+
+        @wp.func
+        def smaller(a: number, b: number) -> number:
+            return wp.where(a < b, a, b)
 
     return SimpleNamespace(read=read, write=write, add=add, larger=larger, smaller=smaller)

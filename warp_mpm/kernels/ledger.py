@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from .elementary import make_elementary
 from .layout import (
     GRID_SHIFT,
     LEDGER_ELASTIC,
@@ -28,6 +29,8 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     pressure_at = pore.pressure
     porosity = pore.porosity
     Parameters = types.Parameters
+    elementary = make_elementary(types)
+    read, larger = elementary.read, elementary.larger
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     RELAXATION = effects.pressure_relaxation
@@ -41,13 +44,16 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     def work_of_stretch(x: wp.float64):
         """(1 + x) ln(1 + x) - x."""
         result = wp.float64(0.0)
-        if wp.abs(x) < wp.float64(0.01):
-            result = x * (wp.float64(wp.static(1.0 / 30.0)) - x * wp.float64(wp.static(1.0 / 42.0)))
-            result = x * (wp.float64(wp.static(1.0 / 12.0)) - x * (wp.float64(wp.static(1.0 / 20.0)) - result))
-            result = wp.float64(0.5) - x * (wp.float64(wp.static(1.0 / 6.0)) - result)
-            result *= x * x
+        if wp.abs(x) < wp.float64(0.2):
+            # ln(1 + x) = 2 artanh t, of which the first seven terms tell it to the last digit.
+            t = x / (wp.float64(2.0) + x)
+            q = t * t
+            tail = wp.float64(wp.static(1.0 / 11.0)) + q * wp.float64(wp.static(1.0 / 13.0))
+            tail = wp.float64(wp.static(1.0 / 7.0)) + q * (wp.float64(wp.static(1.0 / 9.0)) + q * tail)
+            tail = wp.float64(wp.static(1.0 / 3.0)) + q * (wp.float64(wp.static(1.0 / 5.0)) + q * tail)
+            result = (wp.float64(2.0) + x) * q * (one + (one + t) * t * tail)
         else:
-            stretch = wp.max(one + x, wp.float64(1.0e-6))
+            stretch = larger(one + x, wp.float64(1.0e-6))
             result = stretch * wp.log(stretch) - x
         return result
 
@@ -71,7 +77,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         result = volume * modulus * work_of_stretch(strain)
         if volume < grains:
             # At closure V_0 / V was less by the ratio of the volumes.
-            stretch = wp.max(one + strain, wp.float64(1.0e-6))
+            stretch = larger(one + strain, wp.float64(1.0e-6))
             closed = stretch * volume / grains
             result = grains * modulus * (closed * wp.log(closed) - closed + one)
             result += grains * modulus * (stretch - closed - wp.log(stretch / closed))
@@ -114,10 +120,10 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         # Each thread sums for itself and adds to the common sums once.
         p = wp.tid()
         while p < points.inside.shape[0]:
-            if points.inside[p] != 0:
-                reference = points.reference_volume[p]
-                volume = points.volume[p]
-                v = points.velocity[p]
+            if read(points.inside, p) != 0:
+                reference = read(points.reference_volume, p)
+                volume = read(points.volume, p)
+                v = read(points.velocity, p)
                 solid = reference * parameters.solid_density
                 speed = v[0] * v[0] + v[1] * v[1]
                 kinetic = solid * speed
@@ -128,28 +134,29 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     liquid = reference * parameters.liquid_density
                     liquid_speed = v[2] * v[2] + v[3] * v[3]
                     kinetic += liquid * liquid_speed
-                    speed = wp.max(speed, liquid_speed)
+                    speed = larger(speed, liquid_speed)
                     mass += liquid
                     along_x += liquid * v[2]
                     along_y += liquid * v[3]
                     liquid_mass += wp.float64(liquid)
-                s = points.stress[p]
+                s = read(points.stress, p)
                 trace = s[0] + s[1] + s[2]
                 squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
                 deviatoric = squares - trace * trace * F(wp.static(1.0 / 3.0))
                 grains = parameters.grain_share * reference
                 strain = wp.float64(-trace * F(wp.static(1.0 / 3.0))) * per_bulk_modulus
                 # Shear stress s at the volume V was s V / V_0 before the volume changed, which does no work on it.
-                distortion_energy += wp.float64(volume * deviatoric) / wp.max(one + strain, wp.float64(1.0e-6))
+                distortion_energy += wp.float64(volume * deviatoric) / larger(one + strain, wp.float64(1.0e-6))
                 # In double precision always: the work is a small difference of the terms.
                 elastic_energy += stored_in_skeleton(
                     strain, wp.float64(volume), wp.float64(grains), wp.float64(parameters.bulk_modulus)
                 )
-                sound = wp.isfinite(squares) and wp.isfinite(volume) and wp.isfinite(speed)
+                # Not negative, any of them, so that what is not finite in one shows in the sum.
+                sound = squares + volume + speed
                 if LIQUID:
                     # Taken before the pressure's own maximum, which passes over what is no number.
-                    sound = sound and wp.isfinite(points.liquid_strain[p])
-                    pressure = pressure_at(points.liquid_strain[p], parameters)
+                    sound += wp.abs(read(points.liquid_strain, p))
+                    pressure = pressure_at(read(points.liquid_strain, p), parameters)
                     n = porosity(reference, volume, parameters)
                     elastic_energy += stored_in_liquid(
                         wp.float64(n) * wp.float64(pressure) * per_liquid_modulus,
@@ -158,22 +165,22 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                         wp.float64(grains),
                         wp.float64(parameters.liquid_bulk_modulus),
                     )
-                    pressure_max = wp.max(pressure_max, wp.float64(pressure))
+                    pressure_max = larger(pressure_max, wp.float64(pressure))
                     upstream = wp.bool(True)
                     if BARRIER:
-                        upstream = wp.float64(points.position[p][0]) < crest_end
+                        upstream = wp.float64(read(points.position, p)[0]) < crest_end
                     if upstream:
                         if RELAXATION:
-                            pressure -= points.pressure_residual[p]
-                        pressure_mean = wp.max(pressure_mean, wp.float64(pressure))
-                if not sound:
+                            pressure -= read(points.pressure_residual, p)
+                        pressure_mean = larger(pressure_mean, wp.float64(pressure))
+                if not wp.isfinite(sound):
                     not_finite += wp.float64(1.0)
                 kinetic_energy += wp.float64(F(0.5) * kinetic)
-                gravitational_energy -= wp.float64(mass * wp.dot(parameters.gravity, points.position[p]))
+                gravitational_energy -= wp.float64(mass * wp.dot(parameters.gravity, read(points.position, p)))
                 momentum_x += wp.float64(along_x)
                 momentum_y += wp.float64(along_y)
                 solid_mass += wp.float64(solid)
-                speed_max = wp.max(speed_max, wp.float64(speed))
+                speed_max = larger(speed_max, wp.float64(speed))
             p += parameters.workers
         wp.atomic_add(sums, wp.static(LEDGER_SOLID_MASS), solid_mass)
         wp.atomic_add(sums, wp.static(LEDGER_KINETIC), kinetic_energy)

@@ -167,23 +167,19 @@ def make_transfer(
         else:
             force_x = V(xx, xy)
             force_y = V(xy, yy)
-        # The velocity that the point's affine field has at the middle node, and its change from there to the next.
-        middle = velocity
+        # Change of the point's affine velocity field from one node to the next.
         change_x = V()
         change_y = V()
         if APIC:
             change_x = read(points.affine_x, p) * (parameters.spacing * reference)
             change_y = read(points.affine_y, p) * (parameters.spacing * reference)
-            middle += (F(0.5) - fx) * change_x + (F(0.5) - fy) * change_y
+
+        to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
+        to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
 
         # What depends on x alone is formed once per column of nodes.
         for k in range(3):
-            there = middle
-            if k == 0:
-                there = middle - change_x
-            if k == 2:
-                there = middle + change_x
-            column = wx[k] * there
+            column = wx[k] * velocity + (wx[k] * to_x[k]) * change_x
             column_force = dx[k] * force_x
             if APIC:
                 column += column_force
@@ -197,15 +193,11 @@ def make_transfer(
                     # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
                     ratio = n / parameters.porosity
                     add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
-                value = column
                 if APIC:
-                    if m == 0:
-                        value = column - column_change
-                    if m == 2:
-                        value = column + column_change
+                    value = column + to_y[m] * column_change
                     add(grid.velocity, node, wy[m] * value + dy[m] * column_slope)
                 else:
-                    add(grid.velocity, node, wy[m] * value)
+                    add(grid.velocity, node, wy[m] * column)
                     add(grid.force, node, wy[m] * column_force + dy[m] * column_slope)
 
         if PORE_FORCE:
