@@ -100,6 +100,7 @@ def make_constitutive(
     Grid = types.Grid
     Parameters = types.Parameters
     hats = shapes.hats
+    cell_of = shapes.cell_of
     pressure_at = pore.pressure
     porosity = pore.porosity
     elementary = make_elementary(types)
@@ -178,13 +179,10 @@ def make_constitutive(
         shift = F(clock[wp.static(GRID_SHIFT)])
         x = read(points.position, p)
         if CORNERS:
-            sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
-            sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
-            ci = wp.int32(sx)
-            cj = wp.int32(sy)
+            ci, cj, fx, fy = cell_of(x, shift, parameters)
             first = (ci - 1) * parameters.rows + cj - 1
-            hx = hats(sx - F(ci))
-            hy = hats(sy - F(cj))
+            hx = hats(fx)
+            hy = hats(fy)
             smooth = S()
             least_filling = F(1.0)
             for k in range(2):

@@ -10,8 +10,10 @@ import warp as wp
 
 
 def make_shape_functions(types: SimpleNamespace) -> SimpleNamespace:
-    """Build `weights(f)`, `slopes(f)` (derivative times d) and `hats(f)`; each sums to one (slopes to zero)."""
+    """Build `cell_of(x, shift, parameters)`, the cell that a point lies in and its place there, and of that place
+    `weights(f)`, `slopes(f)` (derivative times d) and `hats(f)`; each sums to one (slopes to zero)."""
     F = types.scalar
+    Parameters = types.Parameters
     V2 = types.V2
     V3 = types.V3
 
@@ -28,4 +30,14 @@ def make_shape_functions(types: SimpleNamespace) -> SimpleNamespace:
     def hats(f: F) -> V2:
         return V2(F(1.0) - f, f)
 
-    return SimpleNamespace(weights=weights, slopes=slopes, hats=hats)
+    @wp.func
+    def cell_of(x: V2, shift: F, parameters: Parameters):
+        """Column and row of the cell's node and the place in the cell, both in [0, 1); the grid is displaced by `shift`
+        [m]."""
+        sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
+        sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
+        i = wp.int32(sx)
+        j = wp.int32(sy)
+        return i, j, sx - F(i), sy - F(j)
+
+    return SimpleNamespace(cell_of=cell_of, weights=weights, slopes=slopes, hats=hats)

@@ -34,6 +34,7 @@ def make_transfer(
     weights = shapes.weights
     slopes = shapes.slopes
     hats = shapes.hats
+    cell_of = shapes.cell_of
     elementary = make_elementary(types)
     read, write, add, larger = elementary.read, elementary.write, elementary.add, elementary.larger
 
@@ -104,13 +105,8 @@ def make_transfer(
             return
         x = read(points.position, p)
         shift = F(clock[wp.static(GRID_SHIFT)])
-        sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
-        sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
-        ci = wp.int32(sx)
-        cj = wp.int32(sy)
+        ci, cj, fx, fy = cell_of(x, shift, parameters)
         first = (ci - 1) * parameters.rows + cj - 1
-        fx = sx - F(ci)
-        fy = sy - F(cj)
         wx = weights(fx)
         wy = weights(fy)
         dx = slopes(fx)
@@ -258,13 +254,8 @@ def make_transfer(
         x = read(points.position, p)
         shift = F(clock[wp.static(GRID_SHIFT)])
         time_step = F(clock[wp.static(TIME_STEP)])
-        sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
-        sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
-        ci = wp.int32(sx)
-        cj = wp.int32(sy)
+        ci, cj, fx, fy = cell_of(x, shift, parameters)
         first = (ci - 1) * parameters.rows + cj - 1
-        fx = sx - F(ci)
-        fy = sy - F(cj)
         wx = weights(fx)
         wy = weights(fy)
 

@@ -34,6 +34,7 @@ def speed_tables(base: Scenario, *, device: str, full: bool, progress: Progress)
     scene = base.replaced(SHORT)
     tables = [_ratios(scene, device, progress), _kernels(scene, device, progress)]
     tables += [_sizes(base, device, full, progress), _domains(scene, device, progress), _drag(base, device, progress)]
+    tables += [_larger_steps(base, device, progress)]
     tables += [recording(base, device, progress)]
     if device == "cpu":
         tables += [first_run(CASE, progress), several_at_once(base.replaced({"output.end_time_s": 4.0}), progress)]
@@ -181,6 +182,33 @@ def _drag(base: Scenario, device: str, progress: Progress) -> Table:
         rows.append((*row, f"{displacements[-1]:.4f} ({share:+.1%})"))
     columns = ("drag", "steps to t = 1.2 s", "greatest step [s]", "barrier displacement [m]")
     return Table("drag", "What semi-implicit drag saves, at 0.4 m", columns, rows)
+
+
+def _larger_steps(base: Scenario, device: str, progress: Progress) -> Table:
+    """What a larger step would be worth at best: that of a softer liquid, and what coarser cells give instead."""
+    progress("larger and smaller steps")
+    modulus = base.resolved()["flow"]["material"]["liquid_bulk_modulus_Pa"]
+    named: list[tuple[str, dict[str, Any]]] = [("as it is", {})]
+    named += [(f"Courant number {c:g}", {"numerics.courant_number": c}) for c in (0.5, 0.25)]
+    named += [
+        (f"liquid's bulk modulus / {f}", {"flow.material.liquid_bulk_modulus_Pa": modulus / f}) for f in (4, 16, 64)
+    ]
+    named += [(f"spacing {spacing:g} m", {"numerics.spacing_m": spacing}) for spacing in (0.3, 0.4)]
+    clock, rows, spent = clock_of(device), [], []
+    for name, changes in named:
+        simulation = Simulation(base.replaced({"output.end_time_s": 4.0} | changes), device=device)
+        simulation.advance(1e-6)
+        begin, peak = clock(), 0.0
+        for record in range(1, 401):
+            simulation.advance(0.01 * record)
+            peak = max(peak, simulation.sample()["impact_force_x"])
+        spent.append(clock() - begin)
+        figures = (f"{simulation.steps:,}", f"{simulation.record['time_step_max']:.2e}", f"{spent[-1] / spent[0]:.2f}")
+        rows.append((name, *figures, f"{simulation.barrier_displacement:.3f}", f"{peak / 1e3:.0f}"))
+    columns = (
+        "case 1", "steps to t = 4 s", "greatest step [s]", "time", "barrier displacement [m]", "peak force [kN/m]"
+    )  # fmt: skip
+    return Table("steps", "Larger and smaller steps", columns, rows)
 
 
 CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"

@@ -1,0 +1,70 @@
+"""What compilers make of the kernels: vector instructions for a processor, code for a graphics processor."""
+
+import os
+import platform
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+from warp_mpm.effect_rules import derive_effects
+from warp_mpm.kernels.build import build_kernels
+
+REPOSITORY = Path(__file__).parents[2]
+
+COMPILE = """
+import sys
+from warp_mpm import Scenario, Simulation
+from warp_mpm.kernels import build
+
+build.CPU_COMPILER_FLAGS += " -Rpass=loop-vectorize"
+scenario = Scenario.load(sys.argv[1]).replaced({"numerics.spacing_m": 0.5})
+Simulation(scenario).advance(1e-4)
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="looked at on x86 alone")
+def test_the_update_of_the_points_is_vectorised(tmp_path):
+    """The compiler says so itself; one call or one branch too many and a step costs half as much again."""
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILE, REPOSITORY / "scenarios/case_1.json"],
+        env=os.environ | {"WARP_CACHE_PATH": str(tmp_path), "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (source,) = tmp_path.rglob("*.cpp")
+    lines = source.read_text().splitlines()
+    vectorised = set()
+    for line, width in re.findall(
+        r"\.cpp:(\d+):\d+: remark: vectorized loop \(vectorization width: (\d+)", done.stderr
+    ):
+        # The function that the line stands in: the nearest above it whose name tells the kernel.
+        above = (re.search(r"__locals__(\w+)_[0-9a-f]{8}_cpu_forward_tasks\(", text) for text in lines[int(line) :: -1])
+        kernel = next(match[1] for match in above if match)
+        if int(width) >= 2:
+            vectorised.add(kernel)
+    assert "update" in vectorised
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="Warp comes without CUDA there")
+@pytest.mark.parametrize(
+    ("name", "precision"), [("case_1", "float64"), ("case_1", "float32"), ("case_1_dry", "float64")]
+)
+def test_the_same_kernels_compile_for_a_gpu(load_scene, tmp_path, name, precision):
+    """By NVIDIA's own compiler, which needs no GPU; whether they run there is another question."""
+    effects = derive_effects(load_scene(name, **{"numerics.precision": precision}))
+    kernels = build_kernels(effects)
+    module = wp.get_module(effects.module_name)
+    wp.compile_aot_module(module, arch=[80], module_dir=tmp_path, use_ptx=True)
+    (code,) = tmp_path.glob("*.ptx")
+    text = code.read_text()
+    entries = set(re.findall(r"\.entry \w*__locals__(\w+)_[0-9a-f]{8}_cuda_kernel_forward", text))
+    assert {"scatter", "move", "gather", "advect", "update", "bound", "tick", "slide"} <= entries
+    assert entries <= set(kernels.__dict__)
+    # Points that share a node add to it one after the other.
+    scatter = text[text.index("scatter_") :]
+    assert re.search(rf"(atom|red)\.\S*add\.f{precision[-2:]}", scatter)
