@@ -98,6 +98,7 @@ def run_scenario(
     RunFolder.check(out, force=force)
     preparing = time.perf_counter()
     simulation = make_simulation(scenario)
+    simulation.prepare()
     record = _record(scenario, simulation, origin) | {"preparation_time": time.perf_counter() - preparing}
     with RunFolder.create(out, scenario.resolved(), record, force=force) as folder:
         return _go_on(folder, scenario, simulation, record, on_progress, stop)

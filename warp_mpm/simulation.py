@@ -208,8 +208,8 @@ class Simulation:
         self._sums.zero_()
         self._launch("ledger", self._workers, self._points, self._parameters, self._clock, self._sums)
 
-    def _prepare(self) -> None:
-        """Compile the kernels and capture an interval, once."""
+    def prepare(self) -> None:
+        """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
         if self._graph is None:
             names: list[str] = []
             self._on_launch = names.append
@@ -227,7 +227,7 @@ class Simulation:
     @property
     def launched_kernels(self) -> tuple[str, ...]:
         """Names of the kernels that a step launches, in their order, as captured; the first call compiles them."""
-        self._prepare()
+        self.prepare()
         return self._kernels_of_a_step
 
     @property
@@ -252,7 +252,7 @@ class Simulation:
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
         self._target.fill_(until)
-        self._prepare()
+        self.prepare()
         wp.capture_launch(self._graph)
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())

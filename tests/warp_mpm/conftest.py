@@ -30,6 +30,9 @@ class FlyingPoints:
         self._sampled, self._fail_at = 0.0, fail_at
         self.material_points = len(self._start.volume)
 
+    def prepare(self):
+        """There is nothing to compile."""
+
     def advance(self, until):
         if self._fail_at is not None and until > self._fail_at:
             raise ArithmeticError("the run has diverged")

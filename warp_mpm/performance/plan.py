@@ -17,7 +17,7 @@ from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.time_step import step_limits
 
-PROBE_SECONDS = 0.5
+PROBE_SECONDS, PROBE_TURNS = 0.5, 5
 """Wall time spent on stepping the scene itself."""
 
 TWIN_POINTS = 700
@@ -111,7 +111,7 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
     interval = min(scenario.output.time_series_interval_s, scenario.output.snapshot_interval_s)
     stepper = Stepper(scenario, device=device, clock=clock, interval=interval)
     blocks = stepper.simulation.blocks_in_use
-    (begun,) = in_turns([stepper], rounds=5, seconds=PROBE_SECONDS / 5.0)
+    begun = _probed(stepper)
     simulation = stepper.simulation
     ahead = run_ahead(scenario, device=device)
     step_cost = begun * growth(scenario, ahead, stepper.furthest)
@@ -164,6 +164,19 @@ def what_if(
 def described(value: str | bool) -> str:
     """An effect's value in words."""
     return {True: "on", False: "off"}.get(value, str(value)) if isinstance(value, bool) else value.replace("_", "-")
+
+
+def _probed(stepper: Stepper) -> float:
+    """Mean cost [ns] of the steps from the start until the probe's time is up, or the run's."""
+    costs: list[float] = []
+    while len(costs) < PROBE_TURNS:
+        reached = stepper.furthest
+        cost = stepper.chunk(PROBE_SECONDS / PROBE_TURNS)
+        if costs and stepper.furthest == reached:
+            break  # the run has ended and begun anew
+        costs.append(cost)
+    # Turns take the same time, so that dearer ones have fewer steps.
+    return statistics.harmonic_mean(costs)
 
 
 def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:
