@@ -1,4 +1,4 @@
-"""The command line: `python -m fmu build | check`.
+"""The command line: `python -m fmu build | check | benchmark`.
 
 Exit codes: 0 done, 1 a check failed, 2 the input cannot be used (one sentence says why, on the standard error stream).
 """
@@ -131,6 +131,42 @@ def check(
         print_json(content)
     if not passed:
         raise typer.Exit(FAILED)
+
+
+@app.command(epilog="Example: python -m fmu benchmark --spacing 0.4")
+def benchmark(
+    scenario: Annotated[
+        Path | None, typer.Option(help="Scenario inside DebrisFlow.", show_default="scenarios/set_iib.json")
+    ] = None,
+    spacing: Annotated[float | None, typer.Option(help="Grid spacing [m].", show_default="the scenario's")] = None,
+) -> None:
+    """Measure what the units cost: a step of the closed form through fmpy, and DebrisFlow over the plain simulation."""
+    from analytic.cli.terminal import print_table
+    from fmu import archive, c_unit
+    from fmu.benchmark import closed_form_costs, simulator_costs
+
+    if scenario is not None:
+        _check_scenario(scenario)
+    with tempfile.TemporaryDirectory(prefix="fmu_benchmark_") as temporary:
+        folder = Path(temporary)
+        units = {unit.name: unit for unit in archive.PYTHON_UNITS}
+        try:
+            closed_form = [
+                archive.build_python_unit(units["BarrierSliding"], folder),
+                c_unit.build_c_unit(folder, platforms=(c_unit.host_platform(),)),
+            ]
+            simulator = archive.build_python_unit(units["DebrisFlow"], folder, scenario=scenario)
+            costs = closed_form_costs(closed_form)
+            costs += simulator_costs(simulator, scenario or archive.DEFAULT_SCENARIO, spacing)
+        except (archive.BuildError, ValueError) as error:
+            _refuse(str(error))
+    rows = []
+    for cost in costs:
+        value = f"{cost.value:+.1%}" if cost.unit == "%" else f"{cost.value:.2g} s"
+        if cost.unit == "s" and cost.value < 1e-3:
+            value = f"{1e6 * cost.value:.2g} µs"
+        rows.append([cost.what, value])
+    print_table("Cost of the units, wall time", ["", "measured"], rows)
 
 
 def _prove(file: Path, content: list[object], as_json: bool) -> bool:

@@ -7,12 +7,13 @@ import io
 import math
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+
+from fmu.instance import instance
 
 QUICK_SETTINGS = {"spacing": 1.0}
 """Parameters for a quick run, of those units that have them: a coarse grid will do for a life cycle."""
@@ -83,7 +84,7 @@ def _units(path: Path, folder: Path) -> str:
 
 
 def _starts_right(path: Path, folder: Path) -> str:
-    with _instance(path, folder) as unit:
+    with instance(path, folder, QUICK_SETTINGS) as unit:
         unit.initialize()
         values = unit.outputs()
         wrong = [name for name, value in values.items() if isinstance(value, float) and not math.isfinite(value)]
@@ -117,7 +118,7 @@ def _reference(path: Path, folder: Path) -> str:
 
 def _any_step(path: Path, folder: Path) -> str:
     ends = []
-    with _instance(path, folder) as unit:
+    with instance(path, folder, QUICK_SETTINGS) as unit:
         if "spacing" in unit.variables:
             return "not asked of a simulation: its own time steps end where a communication step does"
         for count in (4, 20, 1000):
@@ -132,7 +133,7 @@ def _any_step(path: Path, folder: Path) -> str:
 
 
 def _state(path: Path, folder: Path) -> str:
-    with _instance(path, folder) as unit:
+    with instance(path, folder, QUICK_SETTINGS) as unit:
         unit.initialize()
         unit.step(0.2)
         state, time = unit.fmu.getFMUstate(), unit.time
@@ -148,7 +149,7 @@ def _state(path: Path, folder: Path) -> str:
 
 
 def _reset(path: Path, folder: Path) -> str:
-    with _instance(path, folder) as unit, _instance(path, folder) as other:
+    with instance(path, folder, QUICK_SETTINGS) as unit, instance(path, folder, QUICK_SETTINGS) as other:
         unit.initialize()
         unit.step(0.3)
         first = unit.real_outputs()
@@ -162,7 +163,7 @@ def _reset(path: Path, folder: Path) -> str:
 
 
 def _refusal(path: Path, folder: Path) -> str:
-    with _instance(path, folder) as unit:
+    with instance(path, folder, QUICK_SETTINGS) as unit:
         name = next(
             name
             for name, v in unit.variables.items()
@@ -192,69 +193,6 @@ _CHECKS: dict[str, Callable[[Path, Path], str]] = {
     "reset": _reset,
     "bad parameter": _refusal,
 }
-
-
-class _Unit:
-    """One instance, variables by name."""
-
-    def __init__(self, path: Path, folder: Path) -> None:
-        from fmpy import extract, read_model_description
-        from fmpy.fmi2 import FMU2Slave
-
-        description = read_model_description(str(path))
-        self.variables = {v.name: v for v in description.modelVariables}
-        unzipped = folder / path.stem
-        if not unzipped.exists():
-            extract(str(path), unzipdir=str(unzipped))
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(unzipped),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=path.stem,
-        )
-        self.fmu.instantiate()
-        self.time = 0.0
-
-    def initialize(self, settings: dict[str, float] | None = None) -> None:
-        self.time = 0.0
-        self.fmu.setupExperiment(startTime=0.0)
-        for name, value in (QUICK_SETTINGS | (settings or {})).items():
-            if name in self.variables:
-                self.fmu.setReal([self.variables[name].valueReference], [value])
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-
-    def step(self, size: float) -> None:
-        self.fmu.doStep(self.time, size)
-        self.time += size
-
-    def reset(self) -> None:
-        self.fmu.reset()
-
-    def outputs(self) -> dict[str, Any]:
-        return {
-            name: getattr(self.fmu, f"get{v.type}")([v.valueReference])[0]
-            for name, v in self.variables.items()
-            if v.causality == "output"
-        }
-
-    def real_outputs(self) -> list[float]:
-        # The ratio of simulated to wall time is the only output that may differ from run to run.
-        chosen = [
-            v.valueReference
-            for name, v in self.variables.items()
-            if v.causality == "output" and v.type == "Real" and name != "time_ratio"
-        ]
-        return list(self.fmu.getReal(chosen))
-
-
-@contextlib.contextmanager
-def _instance(path: Path, folder: Path) -> Iterator[_Unit]:
-    unit = _Unit(path, folder)
-    try:
-        yield unit
-    finally:
-        unit.fmu.fmi2FreeInstance(unit.fmu.component)
 
 
 def _demand(condition: bool, complaint: str) -> None:

@@ -58,7 +58,9 @@ class Worker:
         self.simulation.restore_state(beginning)
         return {}
 
-    def step(self, *, until: float, barrier_velocity: float | None, external_force: float) -> dict[str, Any]:
+    def step(
+        self, *, until: float, barrier_velocity: float | None, external_force: float, overtopped: bool
+    ) -> dict[str, Any]:
         if barrier_velocity is not None and barrier_velocity != self.barrier_velocity:
             self.simulation.set_barrier_velocity(barrier_velocity)
             self.barrier_velocity = barrier_velocity
@@ -71,7 +73,7 @@ class Worker:
             self.external_force = external_force
         if until > self.simulation.time:
             self.simulation.advance(until=until)
-        return self.sample()
+        return self.sample() | (self.overtopped_volume() if overtopped else {})
 
     def sample(self) -> dict[str, Any]:
         values = self.simulation.sample()
@@ -133,7 +135,7 @@ class _Present:
     """The simulation's present state in the shape of a snapshot."""
 
     def __init__(self, simulation: Any) -> None:
-        self._points = simulation.points()
+        self._points = simulation.points(("position", "solid_mass"))
         self.position = self._points["position"]
         self.barrier_displacement = simulation.barrier_displacement
 

@@ -38,11 +38,12 @@ def deposit(scenario: Scenario, snapshot: Snapshot) -> dict[str, float | None]:
     The crest is where the barrier stands at the snapshot. What has left the domain is in neither.
     """
     volume = snapshot["solid_mass"] / scenario.flow.material.solid_partial_density
-    left = scenario.flow.volume - float(volume.sum())
+    initial = scenario.flow.volume
+    left = initial - float(volume.sum())
     result: dict[str, float | None] = {
-        "initial_volume": scenario.flow.volume,
+        "initial_volume": initial,
         # Rounding of single precision is no departure.
-        "left_volume": left if abs(left) > 1e-6 * scenario.flow.volume else 0.0,
+        "left_volume": left if abs(left) > 1e-6 * initial else 0.0,
         "retained_volume": None,
         "on_crest_volume": None,
         "overtopped_volume": None,
@@ -50,9 +51,9 @@ def deposit(scenario: Scenario, snapshot: Snapshot) -> dict[str, float | None]:
     if scenario.barrier is not None:
         crest_start, crest_end, _ = _crest(scenario)
         x = snapshot.position[:, 0] - (snapshot.barrier_displacement or 0.0)
-        result["retained_volume"] = float(volume[x <= crest_start].sum())
-        result["on_crest_volume"] = float(volume[(x > crest_start) & (x <= crest_end)].sum())
-        result["overtopped_volume"] = float(volume[x > crest_end].sum())
+        result["retained_volume"] = float(volume @ (x <= crest_start))
+        result["on_crest_volume"] = float(volume @ ((x > crest_start) & (x <= crest_end)))
+        result["overtopped_volume"] = float(volume @ (x > crest_end))
     return result
 
 

@@ -7,7 +7,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from typing import Any
 
@@ -30,18 +30,6 @@ from .state.samples import Constants, Totals, sample
 from .time_step import step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
-
-
-STATE_OF_POINTS = (
-    "position",
-    "velocity",
-    "stress",
-    "reference_volume",
-    "volume",
-    "deviatoric_strain",
-    "liquid_strain",
-)
-"""Arrays of the material points from which `points` tells their state; the others are intermediate."""
 
 
 @cache
@@ -364,8 +352,8 @@ class Simulation:
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
         self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1].fill_(float(force))
 
-    def points(self) -> dict[str, NDArray[np.float64]]:
-        """State of the N material points still in the domain, as float64 arrays in SI units.
+    def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
+        """State of the N material points still in the domain, as float64 arrays in SI units: all, or what is named.
 
         `position`, `solid_velocity`, `liquid_velocity` [N, 2] (the last with two phases only); `effective_stress`
         [N, 4] (xx, yy, zz, xy, tension positive); `pore_pressure` (compression positive; not if dry), `porosity`,
@@ -373,33 +361,37 @@ class Simulation:
         """
         inside = self._point_arrays["inside"].numpy() > 0
         rows = slice(None) if inside.all() else inside
-        arrays = {
-            name: self._point_arrays[name].numpy()[rows].astype(np.float64)
-            for name in STATE_OF_POINTS
-            if name in self._point_arrays
+        material: Any = self.scenario.flow.material
+
+        @cache
+        def stored(name: str) -> NDArray[np.float64]:
+            return self._point_arrays[name].numpy()[rows].astype(np.float64)
+
+        def grains() -> NDArray[np.float64]:
+            return (1.0 - material.porosity) * stored("reference_volume")
+
+        def porosity() -> NDArray[np.float64]:
+            if self.effects.porosity_update:
+                return np.maximum(1.0 - grains() / stored("volume"), LEAST_POROSITY)
+            return np.full(len(stored("volume")), material.porosity)
+
+        quantities: dict[str, Callable[[], NDArray[np.float64]]] = {
+            "position": lambda: stored("position"),
+            "solid_velocity": lambda: stored("velocity")[:, :2],
+            "effective_stress": lambda: stored("stress"),
+            "deviatoric_strain": lambda: stored("deviatoric_strain"),
+            "volume": lambda: np.maximum(stored("volume"), grains()),
+            "solid_mass": lambda: self._solid_mass[inside],
+            "liquid_mass": lambda: self._liquid_mass[inside],
+            "porosity": porosity,
         }
-        material = self.scenario.flow.material
-        state = {
-            "position": arrays["position"],
-            "solid_velocity": arrays["velocity"][:, :2],
-            "effective_stress": arrays["stress"],
-            "deviatoric_strain": arrays["deviatoric_strain"],
-            "volume": np.maximum(arrays["volume"], (1.0 - material.porosity) * arrays["reference_volume"]),
-            "solid_mass": self._solid_mass[inside],
-            "liquid_mass": self._liquid_mass[inside],
-        }
-        state["porosity"] = np.full(len(arrays["volume"]), material.porosity)
-        if self.effects.porosity_update:
-            grains = (1.0 - material.porosity) * arrays["reference_volume"]
-            state["porosity"] = np.maximum(1.0 - grains / arrays["volume"], LEAST_POROSITY)
         if self.effects.two_phase:
-            state["liquid_velocity"] = arrays["velocity"][:, 2:]
+            quantities["liquid_velocity"] = lambda: stored("velocity")[:, 2:]
         if self.effects.liquid:
-            liquid: Any = material
-            state["pore_pressure"] = np.maximum(
-                -liquid.liquid_bulk_modulus_Pa * arrays["liquid_strain"], -liquid.cavitation_pressure_Pa
+            quantities["pore_pressure"] = lambda: np.maximum(
+                -material.liquid_bulk_modulus_Pa * stored("liquid_strain"), -material.cavitation_pressure_Pa
             )
-        return state
+        return {name: quantities[name]() for name in (quantities if names is None else names)}
 
     def _totals(self) -> Totals:
         return Totals(self._read("clock").tolist(), self._read("reactions").tolist())

@@ -153,7 +153,7 @@ class DebrisFlowSlave(UnitSlave):
         self.states: weakref.WeakSet[WorkerState] = weakref.WeakSet()
         self.start_time = 0.0
         self.wall_time = 0.0
-        self.overtopped_due = False
+        self.overtopped_due = self.overtopped_wanted = False
 
     def start(self) -> None:
         self.start_time, self.wall_time = self.time, 0.0
@@ -193,6 +193,7 @@ class DebrisFlowSlave(UnitSlave):
             until=end - self.start_time,
             barrier_velocity=self["barrier_velocity_input"] if self.opened["driven"] else None,
             external_force=self["external_force"],
+            overtopped=self.overtopped_wanted,
         )
         self.wall_time += time.perf_counter() - started
         self["time_ratio"] = (end - self.start_time) / self.wall_time
@@ -204,12 +205,15 @@ class DebrisFlowSlave(UnitSlave):
         if self.wall_time == 0.0:
             self["time_ratio"] = 0.0
         self["message"] = ""
-        self.overtopped_due = True
+        self.overtopped_due = "overtopped_volume" not in answer
+        if not self.overtopped_due:
+            self["overtopped_volume"] = answer["overtopped_volume"]
 
     def _get(self, kind: str, references: Sequence[int]) -> list[Any]:
-        # It takes all material points, which the other outputs do not: counted only for an importer that asks.
+        # It takes all material points, which the other outputs do not: counted only for an importer that asks, and from
+        # then on within each step.
         if self.overtopped_due and self.worker is not None and kind == "Real" and _OVERTOPPED in references:
-            self.overtopped_due = False
+            self.overtopped_due, self.overtopped_wanted = False, True
             try:
                 answer = self.worker.ask("overtopped_volume", self["reply_time_limit"])
                 self["overtopped_volume"] = answer["overtopped_volume"]

@@ -21,7 +21,7 @@ from typing import IO, Any
 
 from .slave import UnitError
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Version of the requests and answers; the worker names its own when it starts."""
 
 INTERPRETER_VARIABLE = "WARP_MPM_PYTHON"

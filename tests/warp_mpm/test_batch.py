@@ -36,9 +36,10 @@ def test_scenes_run_each_into_its_folder(tmp_path, monkeypatch):
 def test_stop_ends_what_runs_and_begins_no_more(tmp_path, monkeypatch):
     monkeypatch.chdir(SCENES.parent)
     jobs = []
+    endless = ("--spacing", "0.5", "--until", "3600")  # whatever the machine, not over before the stop gets there
     for name in ("case_1", "case_4", "case_6"):
         folder = tmp_path / name
-        jobs.append(Job(name, folder, (str(SCENES / f"{name}.json"), "--out", str(folder), "--spacing", "0.5"), 6.0))
+        jobs.append(Job(name, folder, (str(SCENES / f"{name}.json"), "--out", str(folder), *endless), 3600.0))
     moving = []
     ends = run_jobs(
         jobs,
