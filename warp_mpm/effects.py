@@ -62,7 +62,7 @@ class Effects:
         return self.barrier_friction or self.ground == "frictional"
 
     @property
-    def effective_contact_force(self) -> bool:
+    def liquid_alone(self) -> bool:
         """Friction follows the effective normal force, so that the nodes tell what the liquid would do alone."""
         return self.friction and self.liquid
 

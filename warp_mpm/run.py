@@ -138,7 +138,10 @@ def resume_run(
         checkpoint = None
         if (out / run_folder.CHECKPOINT).exists():
             checkpoint = read_checkpoint(out / run_folder.CHECKPOINT, scenario.resolved())
+        preparing = time.perf_counter()
         simulation = make_simulation(scenario)
+        simulation.prepare()
+        preparation_time = time.perf_counter() - preparing
         if checkpoint is None:
             for name in (run_folder.TIME_SERIES, run_folder.SNAPSHOTS):
                 (out / name).unlink(missing_ok=True)
@@ -148,7 +151,12 @@ def resume_run(
             except ValueError as error:
                 raise RunFolderError(f"{out / run_folder.CHECKPOINT} cannot be used: {error}.") from None
         start = checkpoint.time if checkpoint is not None else 0.0
-        resumed = {"at": _now(), "simulated_time": start, "device": str(simulation.device)}
+        resumed = {
+            "at": _now(),
+            "simulated_time": start,
+            "device": str(simulation.device),
+            "preparation_time": preparation_time,
+        }
         record |= {"status": "running", "problem": None, "resumed": [*record.get("resumed", []), resumed]}
         return _go_on(folder, scenario, simulation, record, on_progress, stop, checkpoint)
 
@@ -193,7 +201,7 @@ def _go_on(
 
     def report(simulated: Any) -> None:
         now, wall = simulated.time, time.perf_counter()
-        first.extend([] if first else [now, wall])  # kernels are compiled in the stretch before
+        first.extend([] if first else [now, wall])
         rate = (now - first[0]) / (wall - first[1]) if now > first[0] else None
         if on_progress is not None:
             on_progress(RunProgress(now, end_time, rate, series.latest))

@@ -10,7 +10,12 @@ from fmu.__main__ import BAD_INPUT, app
 def test_every_unit_has_its_line() -> None:
     answer = CliRunner().invoke(app, ["benchmark", "--spacing", "1.5"])
     assert answer.exit_code == 0, answer.output
-    for line in ("BarrierSliding.fmu, one step", "BarrierSlidingC.fmu, one step", "DebrisFlow.fmu, start", "over a plain"):
+    for line in (
+        "BarrierSliding.fmu, one step",
+        "BarrierSlidingC.fmu, one step",
+        "DebrisFlow.fmu, start",
+        "over a plain",
+    ):
         assert line in answer.stdout
 
 

@@ -50,6 +50,14 @@ def test_noticed_within_one_interval(simulation, name, value, quantity):
         assert simulation.record["points_left"] == 0  # it has not left the domain in silence
 
 
+@pytest.mark.parametrize("component", range(4))
+def test_a_sample_tells_of_any_velocity_that_is_no_number(simulation, component):
+    """Of both phases, although the greatest speed passes over what is no number."""
+    spoil(simulation, "velocity", np.where(np.arange(4) == component, np.nan, 1.0))
+    with pytest.raises(SimulationDiverged, match="the velocity"):
+        simulation.sample()
+
+
 def test_a_barrier_at_any_speed_keeps_the_flow_on_the_grid(load_scene):
     """At 3 km/s the grid, which rides with the barrier, passes several of its cells in a step."""
     motion = {"kind": "prescribed", "times_s": [0.0, 0.02], "velocities_m_per_s": [0.0, 3000.0]}

@@ -108,6 +108,30 @@ def test_stopped_in_time_and_again(tmp_path, whole):
     assert [event["simulated_time"] for event in resumed] == pytest.approx([0.74, 1.13])
 
 
+def test_kernels_are_compiled_before_the_clock_starts(tmp_path, coarse_case_1, flying_points):
+    """Of a run and of one that goes on: their compilation is no part of the wall time."""
+    calls = []
+
+    class Told(flying_points):
+        def prepare(self):
+            calls.append("prepare")
+
+        def advance(self, until):
+            calls.append("advance")
+            super().advance(until)
+
+    run_scenario(coarse_case_1, tmp_path / "run", make_simulation=Told, stop=lambda: len(calls) > 3)
+    assert calls.count("prepare") == 1
+    assert calls[0] == "prepare"
+    calls.clear()
+    resume_run(tmp_path / "run", make_simulation=Told)
+    assert calls.count("prepare") == 1
+    assert calls[0] == "prepare"
+    record = Results.open(tmp_path / "run").record
+    assert record["preparation_time"] > 0.0
+    assert record["resumed"][0]["preparation_time"] > 0.0
+
+
 def test_records_that_only_the_stop_called_for_are_dropped(tmp_path, coarse_case_1, flying_points):
     """Stopped at a snapshot between two samples: the time series got a sample that is not in its schedule."""
     scenario = coarse_case_1.replaced({"output.snapshot_interval_s": 0.0371})

@@ -119,6 +119,11 @@ def affine(scenes):
 
 
 @pytest.fixture(scope="module")
+def rough(scenes):
+    return Bench(scenes["case_1"].replaced({"numerics.volumetric_smoothing": False}))
+
+
+@pytest.fixture(scope="module")
 def flip(scenes):
     return Bench(scenes["case_1_dry"].replaced({"numerics.transfer": "flip", "numerics.pic_share": 0.25}))
 
@@ -182,10 +187,6 @@ def test_gather_brings_velocity_gradient_and_affine_field(affine):
     np.testing.assert_allclose(affine.get("velocity"), np.einsum("pij,ija->pa", affine.weight, nodes), atol=1e-14)
     solid = gradient[:, :2].reshape(-1, 4)
     np.testing.assert_allclose(affine.get("gradient"), solid, atol=1e-12)
-    liquid = gradient[:, 2, 0] + gradient[:, 3, 1]
-    corner = affine.simulation._grid_arrays["corner"].numpy().sum(axis=(0, 1))
-    np.testing.assert_allclose(corner[1], affine.reference @ (solid[:, 0] + solid[:, 3]), rtol=1e-12)
-    np.testing.assert_allclose(corner[4], affine.reference @ liquid, rtol=1e-12)
     x, y = affine.simulation.grid.node_positions()
     node = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     away = node[None] - affine.position[:, None, None, :]
@@ -193,6 +194,33 @@ def test_gather_brings_velocity_gradient_and_affine_field(affine):
     field = np.einsum("pij,ija,pijb->pab", affine.weight, nodes, away) * 4.0 / affine.simulation.grid.spacing**2
     np.testing.assert_allclose(affine.get("affine_x"), field[:, :, 0], atol=1e-12)
     np.testing.assert_allclose(affine.get("affine_y"), field[:, :, 1], atol=1e-12)
+
+
+def test_corners_receive_volume_strain_rates_and_excess_pressure(affine):
+    """Each corner the sums over the points around, by bilinear hats; it lies half a cell beyond its node."""
+    nodes = random_velocities(affine)
+    affine.scatter()  # empties the corners
+    affine.gather(nodes)
+    spacing = affine.simulation.grid.spacing
+    x, y = (nodes + 0.5 * spacing for nodes in affine.simulation.grid.node_positions())
+    hat_x, hat_y = (
+        np.maximum(1.0 - np.abs(affine.position[:, k : k + 1] - at_) / spacing, 0.0) for k, at_ in enumerate((x, y))
+    )
+    volume = np.einsum("p,pi,pj->pij", affine.reference, hat_x, hat_y)
+    gradient = np.einsum("pija,ijb->pba", affine.slope, nodes)
+    divergence = gradient[:, ::2, 0] + gradient[:, 1::2, 1]  # of solid and liquid
+    excess = affine.pressure - affine.material.liquid_density_kg_per_m3 * affine.position @ GRAVITY
+    corner = affine.simulation._grid_arrays["corner"].numpy()
+    for place, values in ((0, np.ones(affine.number)), (1, divergence[:, 0]), (2, excess), (4, divergence[:, 1])):
+        expected = np.einsum("pij,p->ij", volume, values)
+        np.testing.assert_allclose(corner[..., place], expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_without_smoothing_a_point_keeps_its_own_liquid_divergence(rough):
+    nodes = random_velocities(rough)
+    rough.gather(nodes)
+    gradient = np.einsum("pija,ijb->pba", rough.slope, nodes)
+    np.testing.assert_allclose(rough.get("liquid_divergence"), gradient[:, 2, 0] + gradient[:, 3, 1], atol=1e-11)
 
 
 def test_a_linear_velocity_field_arrives_as_it_is(affine):

@@ -140,7 +140,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
             go = wp.int32(0)
         clock[wp.static(TIME)] = time
         speed = clock[wp.static(SPEED_MAX)]
-        # The greatest speed passes over NaN; a NaN anywhere in a velocity makes a position NaN, which `update` notices.
+        # The greatest speed passes over NaN; a NaN anywhere in a velocity makes a position NaN, which `advect` notices.
         if not (speed < wp.static(FASTEST * FASTEST)) or not wp.isfinite(clock[wp.static(BARRIER_VELOCITY)]):
             counters[wp.static(DIVERGED)] = 1
         if counters[wp.static(DIVERGED)] != 0:

@@ -252,7 +252,10 @@ def make_constitutive(
 
     @wp.kernel(module=module)
     def update(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """Strains, effective stress and pore pressure from the rates at the point, time step by time step."""
+        """Strains, effective stress and pore pressure at the end of the step, from the rates at the point.
+
+        Points that have left pass through as well, as `leave` has made them: at rest, so that nothing changes.
+        """
         p = wp.tid()
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
@@ -262,9 +265,6 @@ def make_constitutive(
             smooth = read(points.smooth, p)
         reference = read(points.reference_volume, p)
         volume = read(points.volume, p)
-        n = F(0.0)
-        if LIQUID:
-            n = parameters.porosity
         if TWO_PHASE:
             n = porosity(reference, volume, parameters)
         liquid_divergence = F(0.0)
@@ -333,9 +333,11 @@ def make_constitutive(
     def bound(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
         p = wp.tid()
+        if read(points.inside, p) == 0:
+            return
         grains = parameters.grain_share * read(points.reference_volume, p)
         volume = read(points.volume, p)
-        if volume < grains and read(points.inside, p) == 1:
+        if volume < grains:
             # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
             v = read(points.velocity, p)
             gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed

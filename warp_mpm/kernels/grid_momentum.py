@@ -19,7 +19,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     POROSITY = effects.porosity_update
     FLIP = effects.transfer == "flip"
-    LIQUID_ALONE = effects.effective_contact_force
+    LIQUID_ALONE = effects.liquid_alone
 
     @wp.func
     def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:

@@ -168,8 +168,9 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["increment"] = array(dtype=V, ndim=2)
     if effects.porosity_update:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient times volume
-    if effects.effective_contact_force:
-        # Velocity that the liquid would have alone, until `move`: its momentum beyond that of the mixture.
+    if effects.liquid_alone:
+        # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
+        # would exceed the mixture's; with two phases `move` alone writes it.
         grid["liquid_alone"] = array(dtype=V2, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)

@@ -44,8 +44,8 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     def work_of_stretch(x: wp.float64):
         """(1 + x) ln(1 + x) - x."""
         result = wp.float64(0.0)
-        if wp.abs(x) < wp.float64(0.2):
-            # ln(1 + x) = 2 artanh t, of which the first seven terms tell it to the last digit.
+        if wp.abs(x) < wp.float64(0.15):
+            # ln(1 + x) = 2 artanh t, of which the first seven terms leave 1e-15.
             t = x / (wp.float64(2.0) + x)
             q = t * t
             tail = wp.float64(wp.static(1.0 / 11.0)) + q * wp.float64(wp.static(1.0 / 13.0))
@@ -152,7 +152,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     strain, wp.float64(volume), wp.float64(grains), wp.float64(parameters.bulk_modulus)
                 )
                 # Not negative, any of them, so that what is not finite in one shows in the sum.
-                sound = squares + volume + speed
+                sound = squares + volume + kinetic
                 if LIQUID:
                     # Taken before the pressure's own maximum, which passes over what is no number.
                     sound += wp.abs(read(points.liquid_strain, p))

@@ -46,7 +46,7 @@ def make_transfer(
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
-    PORE_FORCE = effects.effective_contact_force and not TWO_PHASE
+    LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
     GROUND_FRICTION = effects.ground == "frictional"
     BARRIER_FRICTION = effects.barrier_friction
     POROSITY = effects.porosity_update
@@ -71,7 +71,7 @@ def make_transfer(
                 grid.velocity[i, j] = V()
                 if FLIP:
                     grid.force[i, j] = V()
-                if PORE_FORCE:
+                if LIQUID_ALONE:
                     grid.liquid_alone[i, j] = V2()
                 if POROSITY:
                     grid.drag[i, j] = F(0.0)
@@ -196,9 +196,9 @@ def make_transfer(
                     add(grid.velocity, node, wy[m] * column)
                     add(grid.force, node, wy[m] * column_force + dy[m] * column_slope)
 
-        if PORE_FORCE:
+        if LIQUID_ALONE:
             rubbed = wp.bool(False)
-            # Only nodes of a surface that rubs read the surplus. A point's farthest node is 1.5 sqrt(2) cells away, and
+            # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
             if GROUND_FRICTION:
                 if cj - 2 <= parameters.ground_row:
@@ -221,8 +221,8 @@ def make_transfer(
                 along_y = V2(F(0.0), alone) - share * force_y
                 for k in range(3):
                     for m in range(3):
-                        surplus = (dx[k] * wy[m]) * along_x + (wx[k] * dy[m]) * along_y
-                        add(grid.liquid_alone, first + k * parameters.rows + m, surplus)
+                        excess = (dx[k] * wy[m]) * along_x + (wx[k] * dy[m]) * along_y
+                        add(grid.liquid_alone, first + k * parameters.rows + m, excess)
 
     @wp.func
     def mean(w: V3, low: V, middle: V, high: V) -> V:

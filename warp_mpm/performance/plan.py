@@ -18,7 +18,7 @@ from warp_mpm.simulation import Simulation
 from warp_mpm.time_step import step_limits
 
 PROBE_SECONDS, PROBE_TURNS = 0.5, 5
-"""Wall time spent on stepping the scene itself."""
+"""Wall time [s] spent on stepping the scene itself, and in how many turns."""
 
 TWIN_POINTS = 700
 """Material points of the coarse twin that is run ahead to see how fast the flow gets."""
@@ -167,16 +167,15 @@ def described(value: str | bool) -> str:
 
 
 def _probed(stepper: Stepper) -> float:
-    """Mean cost [ns] of the steps from the start until the probe's time is up, or the run's."""
-    costs: list[float] = []
-    while len(costs) < PROBE_TURNS:
+    """Mean cost [ns] per point of the steps from the start until the probe's time is up, or the run's."""
+    time, steps = 0.0, 0
+    for _ in range(PROBE_TURNS):
         reached = stepper.furthest
-        cost = stepper.chunk(PROBE_SECONDS / PROBE_TURNS)
-        if costs and stepper.furthest == reached:
+        spent, made = stepper.stretch(PROBE_SECONDS / PROBE_TURNS)
+        if steps and stepper.furthest == reached:
             break  # the run has ended and begun anew
-        costs.append(cost)
-    # Turns take the same time, so that dearer ones have fewer steps.
-    return statistics.harmonic_mean(costs)
+        time, steps = time + spent, steps + made
+    return 1e9 * time / (steps * stepper.simulation.material_points)
 
 
 def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:

@@ -68,10 +68,15 @@ class Stepper:
         self.furthest = max(self.furthest, end)
         return spent, simulation.steps - before
 
-    def chunk(self, seconds: float) -> float:
-        """Step for about `seconds` and return the cost [ns] per point and step."""
+    def stretch(self, seconds: float) -> tuple[float, int]:
+        """Step for about `seconds`; time [s] that it took, and number of steps."""
         spent, steps = self._cost(max(4, math.ceil(seconds / self._per_step)))
         self._per_step = max(spent / steps, 1e-7)
+        return spent, steps
+
+    def chunk(self, seconds: float) -> float:
+        """Step for about `seconds` and return the cost [ns] per point and step."""
+        spent, steps = self.stretch(seconds)
         return 1e9 * spent / (steps * self._points)
 
 
