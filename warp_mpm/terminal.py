@@ -154,8 +154,8 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
-        ("peak force F₂ₓ", kilo("peak_force", "kN/m", "peak_force_time")),
-        ("  mean over 0.05 s", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
+        ("peak force F₂ₓ, 0.05 s mean", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
+        ("  over one record", kilo("peak_force", "kN/m", "peak_force_time")),
         ("impulse", kilo("impulse", "kN s/m")),
         ("impact from", plain("impact_start_time", "s", 3)),
         ("rise time T₁, duration T₂", _pair(plain("rise_time", "s", 3), plain("impact_duration", "s", 3))),
