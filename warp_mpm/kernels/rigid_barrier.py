@@ -31,9 +31,9 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
 
         m_2 (v - v_2) = J_x(v) + F_ext dt - sign(v) tan(delta_b) max(0, W dt - J_y(v)),
 
-    and v = 0 where friction can hold it. The unknown is bracketed and found by regula falsi (Illinois), for the residual
-    is mostly piecewise linear and decreasing. Where it jumps from one sign to the other, v is where it jumps, and friction
-    takes what lies between.
+    and v = 0 where friction can hold it. The unknown is bracketed and found by regula falsi (Illinois), for the
+    residual is mostly piecewise linear and decreasing. Where it jumps from one sign to the other, v is where it jumps,
+    and friction takes what lies between.
     """
     F = types.scalar
     V2 = types.V2
