@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals
+from warp_mpm.commands.refusals import refusals, with_options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,9 +44,7 @@ def plan(
         from warp_mpm.performance.plan import what_if as switched
         from warp_mpm.scenario import Scenario
 
-        changes = {"numerics.spacing_m": spacing, "output.end_time_s": until}
-        scenario = Scenario.load(scenario_file)
-        scenario = scenario.replaced({path: value for path, value in changes.items() if value is not None})
+        scenario = with_options(Scenario.load(scenario_file), spacing=spacing, until=until)
         console = Console(highlight=False, markup=False)
         if not console.is_terminal:
             console.width = 130
