@@ -234,6 +234,15 @@ def test_check_tells_of_a_driven_barrier_and_of_a_slope(command):
     assert "no barrier; ends at 4 s" in result.stdout
 
 
+def test_check_tells_of_a_slip(command):
+    scene = json.loads(Path(SET_IIB).read_text())
+    scene["flow"]["material"]["grain_density_kg_per_m3"] = 2.65
+    Path("slip.json").write_text(json.dumps(scene))
+    result = command("check", "slip.json")
+    assert result.exit_code == 0
+    assert "Note: flow.material.grain_density_kg_per_m3 = 2.65 is lighter than water" in result.stdout
+
+
 def test_check_goes_on_after_a_bad_file(command):
     Path("bad.json").write_text(json.dumps({**json.loads(Path(SET_IIB).read_text()), "flwo": 3}))
     result = command("check", "bad.json", SET_IIB)

@@ -17,14 +17,17 @@ def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
 ) -> None:
     """Check scenario files and tell what they describe; nothing is run or written."""
+    from warp_mpm.caveats import scene_caveats
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
     failed = False
     for file in files:
         try:
-            first, *others = described(Scenario.load(file))
-            typer.echo("\n  ".join([f"{file}: {first}", *others]))
+            scenario = Scenario.load(file)
+            first, *others = described(scenario)
+            notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
+            typer.echo("\n  ".join([f"{file}: {first}", *others, *notes]))
         except ScenarioError as error:
             failed = True
             complain(str(error))
