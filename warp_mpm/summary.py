@@ -61,7 +61,8 @@ DEFINITIONS = {
     "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
     "momentum and the impulse of its weight",
     "energy_error": "greatest energy that appeared beyond what was there at the start less the work done on the "
-    "barrier, over the flow's initial energy; plastic flow and drag only take energy away",
+    "barrier and beyond gravity's work on liquid that seeps, over the flow's initial energy; plastic flow and drag "
+    "only take energy away",
 }
 """How each figure that could be understood in several ways is taken."""
 
@@ -192,7 +193,7 @@ def energy_error(series: Series) -> float | None:
     if any(part not in series for part in parts):
         return None
     total = sum((series[part] for part in parts), np.zeros(len(series["time"])))
-    total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0)
+    total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0) - series.get("seepage_work", 0.0)
     scale = float(sum(abs(series[part][0]) for part in parts))
     return max(0.0, float((total - total[0]).max())) / scale if scale > 0.0 else None
 

@@ -136,9 +136,11 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     row("energy of the flow at the end", last, "kJ/m", 1e-3)
     row("work done on the barrier", at("barrier_work", -1), "kJ/m", 1e-3)
     row("  of it taken by base friction", at("base_friction_work", -1), "kJ/m", 1e-3)
+    row("work of gravity on seepage", at("seepage_work", -1), "kJ/m", 1e-3)
     row("energy that left the domain", at("left_energy", -1), "kJ/m", 1e-3)
     if first is not None and last is not None:
         spent = first - last - (at("barrier_work", -1) or 0.0) - (at("left_energy", -1) or 0.0)
+        spent += at("seepage_work", -1) or 0.0
         row("dissipated in the flow", spent, "kJ/m", 1e-3)
     row("energy created, relative", summary.get("energy_error"), "")
     return rows
