@@ -11,6 +11,8 @@ from typing import Any, get_args
 import typer
 from typer.core import TyperGroup
 
+from analytic.whole_file import UnwrittenError
+
 BAD_INPUT = 2
 """Exit code of an input that cannot be used."""
 
@@ -20,7 +22,7 @@ def refusals() -> Iterator[None]:
     """Refuse with its own sentence what raises a ValueError, which all bad inputs do, and what the disk refuses."""
     try:
         yield
-    except ValueError as error:
+    except (ValueError, UnwrittenError) as error:
         raise typer.BadParameter(str(error)) from None
     except BrokenPipeError:  # the reader of a pipe has seen enough; that is no mistake
         raise

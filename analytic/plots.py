@@ -19,6 +19,7 @@ from analytic.impact import Impact
 from analytic.reliability import Reliability
 from analytic.sweep import Run
 from analytic.sweep_fit import SMALL_DISPLACEMENT
+from analytic.whole_file import UnwrittenError, whole_file
 
 Array = NDArray[np.float64]
 
@@ -59,14 +60,12 @@ def save(figure: Figure, path: Path) -> None:
     PlotError: see ``check_path``, or the file cannot be written.
     """
     check_path(path)
-    aside = path.with_name(path.name + ".new")
     FigureCanvasAgg(figure)
     try:
-        figure.savefig(aside, dpi=150, format=path.suffix.lstrip(".").lower())
-        aside.replace(path)
-    except OSError as error:
-        aside.unlink(missing_ok=True)
-        raise PlotError(f"{path} cannot be written: {error.strerror or error}.") from None
+        with whole_file(path) as aside:
+            figure.savefig(aside, dpi=150, format=path.suffix.lstrip(".").lower())
+    except UnwrittenError as error:
+        raise PlotError(str(error)) from None
 
 
 def impacts(curves: Mapping[str, Impact], title: str = "") -> Figure:
@@ -160,7 +159,7 @@ def comparison(title: str, figures: Mapping[str, Mapping[str, KeyFigures]], slid
     ``figures``: by record, then by source ("simulated", "closed form, ...").
     """
     names = [name for name in KEY_FIGURE_LABELS if sliding or not name.startswith("barrier")]
-    figure = Figure(figsize=(10, 3.0 * -(-len(names) // 2) + 0.5), layout="constrained")
+    figure = Figure(figsize=(10, 3.0 * -(-len(names) // 2) + 0.8), layout="constrained")
     figure.suptitle(title, fontsize=11)
     axes = figure.subplots(-(-len(names) // 2), 2).ravel()
     sources = list(dict.fromkeys(source for record in figures.values() for source in record))
@@ -175,7 +174,9 @@ def comparison(title: str, figures: Mapping[str, Mapping[str, KeyFigures]], slid
         axis.set_ylabel(label)
         axis.set_xticks(place, list(figures), rotation=25, ha="right", fontsize=8)
         axis.grid(alpha=0.3, axis="y")
-    axes[0].legend(fontsize=8)
+    # Below the panels: within one, a legend hides the bars of some record.
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(sources), fontsize=8)
     return figure
 
 

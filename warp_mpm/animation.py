@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from analytic.whole_file import whole_file
 from warp_mpm.fields import Field, colour_limits, field_named
-from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, shown, window
-from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid
+from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, in_lines, shown, window
+from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.summary import FILTER_WINDOW, moving_mean
 
@@ -43,6 +44,7 @@ def write_film(
 
     Raises:
         PlotError: the file's format is unknown, its folder does not exist, or what writes mp4 is not installed.
+        UnwrittenError: the file cannot be written.
         ResultsError: the run cannot be read, holds no two snapshots, or has no such field.
         ValueError: the field is not known.
     """
@@ -55,13 +57,9 @@ def write_film(
     # Snapshots too near or too far from each other for a player: some are left out, or each stays longer.
     stride = max(1, math.ceil(speed / interval / FASTEST))
     rate = max(speed / interval / stride, SLOWEST)
-    aside = target.with_name(f"{target.stem}.new{target.suffix}")
-    pictures = _pictures(results, field, width, watch(range(0, len(snapshots), stride)))
-    try:
-        _write_gif(pictures, aside, rate) if target.suffix.lower() == ".gif" else _write_mp4(pictures, aside, rate)
-        aside.replace(target)
-    finally:
-        aside.unlink(missing_ok=True)
+    write = _write_gif if target.suffix.lower() == ".gif" else _write_mp4
+    with whole_file(target) as aside:
+        write(_pictures(results, field, width, watch(range(0, len(snapshots), stride))), aside, rate)
 
 
 def _pictures(results: Results, field: Field, width: int, frames: Iterable[int]) -> Iterator[np.ndarray]:
@@ -72,11 +70,14 @@ def _pictures(results: Results, field: Field, width: int, frames: Iterable[int])
     view = _film_window(window(scenario, sparse), sparse)
     left, right, bottom, top = view
     curves = "impact_force_x" in results.time_series
-    dpi = 100.0
-    flow_height = min(max(0.85 * width / dpi * (top - bottom) / (right - left), 1.5), 0.6 * width / dpi)
-    height = flow_height + 1.0 + (2.1 if curves else 0.0)
+    # Letters shrink with the picture, but by less, so that they can be read; what is left of a step is for rounding.
+    dpi = 100.0 * math.sqrt(width / 1280)
+    wide = (width + 0.1) / dpi
+    flow_height = min(max(0.85 * wide * (top - bottom) / (right - left), 1.5), 0.6 * wide)
+    height = flow_height + 1.2 + (2.1 if curves else 0.0)
     # Encoders want even numbers of pixels.
-    figure = Figure(figsize=(width / dpi, 2 * round(height * dpi / 2) / dpi), dpi=dpi, layout="constrained")
+    figure = Figure(figsize=(wide, (2 * round(height * dpi / 2) + 0.1) / dpi), dpi=dpi, layout="constrained")
+    heading(figure, scenario.title)
     canvas = FigureCanvasAgg(figure)
     panels = figure.subplots(2, 1, height_ratios=[flow_height, 2.1]) if curves else [figure.subplots()]
     marks = _draw_curves(panels[1], results) if curves else []
@@ -87,9 +88,10 @@ def _pictures(results: Results, field: Field, width: int, frames: Iterable[int])
         drawn = draw_points(panels[0], frame, shown(results, frame, field), field, limits)
         draw_surroundings(panels[0], scenario, frame, view)
         panels[0].set(xlabel="x [m]", ylabel="y [m]")
-        panels[0].set_title(f"{scenario.title}   t = {frame.time:.2f} s", fontsize=10, loc="left")
+        panels[0].set_title(f"t = {frame.time:.2f} s", fontsize=10, loc="left")
         if bar is None:
-            bar = figure.colorbar(drawn, ax=panels[0], label=field.title, extend="both" if field.signed else "max")
+            label = in_lines(field.title, flow_height)
+            bar = figure.colorbar(drawn, ax=panels[0], label=label, extend="both" if field.signed else "max")
         for mark in marks:
             mark.set_xdata([frame.time, frame.time])
         canvas.draw()
@@ -126,7 +128,7 @@ def _write_gif(pictures: Iterator[np.ndarray], target: Path, rate: float) -> Non
 
     images = (Image.fromarray(picture).quantize(128) for picture in pictures)
     first = next(images)
-    first.save(target, save_all=True, append_images=images, duration=round(1000 / rate), loop=0, optimize=False)
+    first.save(target, "GIF", save_all=True, append_images=images, duration=round(1000 / rate), loop=0, optimize=False)
 
 
 def _write_mp4(pictures: Iterator[np.ndarray], target: Path, rate: float) -> None:
@@ -142,7 +144,7 @@ def _write_mp4(pictures: Iterator[np.ndarray], target: Path, rate: float) -> Non
         (first.shape[1], first.shape[0]),
         fps=rate,
         codec="libx264",
-        output_params=["-crf", "20"],
+        output_params=["-crf", "20", "-f", "mp4"],
         macro_block_size=2,
     )
     writer.send(None)

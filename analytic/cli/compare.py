@@ -142,6 +142,9 @@ def _print_pressures(scene: Scene) -> None:
 def _figure(found: dict[str, dict[str, Any]], scenes: dict[str, Scene]) -> Any:
     from analytic import plots
 
-    sliding = any(not scene.fixed for scene in scenes.values())
-    kind = "sliding barriers" if sliding else "fixed barriers"
-    return plots.comparison(f"Simulated and closed-form impact, {kind}", found, sliding)
+    kinds = {True: "fixed", False: "sliding"}
+    kind = " and ".join(word for fixed, word in kinds.items() if any(one.fixed == fixed for one in scenes.values()))
+    barriers = "barriers" if len(scenes) > 1 else "barrier"
+    sources = {source for rows in found.values() for source in rows}
+    words = "Simulated and closed-form impact" if SIMULATED in sources else "Closed-form impact"
+    return plots.comparison(f"{words}, {kind} {barriers}", found, "sliding" in kind)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
@@ -268,6 +270,29 @@ def test_compare_shows_the_variants_of_a_scenario_and_the_pressure_formulas() ->
     assert refusal("compare", str(SCENARIOS / "set_i.json"), "--variant", "x").startswith(
         "--variant = 'x' is not allowed"
     )
+
+
+@pytest.mark.parametrize(
+    ("names", "title"),
+    [
+        (["set_i"], "Closed-form impact, sliding barrier"),
+        (["set_i", "set_v"], "Closed-form impact, sliding barriers"),
+        (["set_i_fixed", "set_v_fixed"], "Closed-form impact, fixed barriers"),
+        (["set_i", "set_i_fixed"], "Closed-form impact, fixed and sliding barriers"),
+    ],
+)
+def test_compare_draws_all_bars_under_a_title_that_is_true(
+    names: list[str], title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(plots, "save", lambda figure, path: figures.append(figure))
+    call("compare", *(str(SCENARIOS / f"{name}.json") for name in names), "--plot", str(tmp_path / "fig.png"))
+    (figure,) = figures
+    assert figure.get_suptitle() == title
+    FigureCanvasAgg(figure).draw()
+    (legend,) = figure.legends
+    assert not any(legend.get_window_extent().overlaps(axis.bbox) for axis in figure.axes)
+    assert all(axis.get_legend() is None for axis in figure.axes)
 
 
 # --- field -----------------------------------------------------------------------------------------------------------

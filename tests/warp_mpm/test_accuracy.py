@@ -6,17 +6,20 @@ import json
 import math
 import re
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
 from warp_mpm.accuracy.check import Check, drawn, holds, table
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.measure import measure
+from warp_mpm.accuracy.pictures import error_against_time
 from warp_mpm.accuracy.purchase import (
     PurchaseError,
     Rung,
@@ -265,6 +268,24 @@ class TestVerdict:
         lines = csv_table(study).splitlines()
         assert len(lines) == 1 + sum(not s.physics for s in settings)
         assert len({len(re.findall(r',(?=(?:[^"]*"[^"]*")*[^"]*$)', line)) for line in lines}) == 1
+
+
+class TestPictures:
+    def test_settings_and_spacings_are_told_apart(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=False)
+        random = np.random.default_rng(3)
+        results = {s.key: made_up(s.scenario, wobble=random.normal(0.0, 0.005)) for s in settings}
+        figure = error_against_time(evaluate(scene, settings, results), formulas(scene))
+        panel = figure.axes[0]
+        knobs = {"spacing alone [m]", *(name.replace("_", " ") for name in KNOBS)}
+        marks = [line.get_marker() for line in panel.lines if line.get_label() in knobs]
+        assert len(marks) == len(set(marks)) == len(knobs)
+        FigureCanvasAgg(figure).draw()
+        for panel in figure.axes:
+            labels = [text.get_window_extent() for text in panel.texts if text.get_visible()]
+            assert all(not one.overlaps(other) for one, other in combinations(labels, 2))
+            assert all(panel.bbox.contains(*corner) for one in labels for corner in (one.min, one.max))
+        assert {text.get_text() for text in figure.axes[0].texts if text.get_visible()} >= {"0.4", "0.3", "0.1"}
 
 
 class TestFormulas:

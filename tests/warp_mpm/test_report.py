@@ -94,6 +94,16 @@ def test_page_tells_what_the_run_folder_tells(run, tmp_path):
     assert ["error of momentum, relative", f"{results.summary['momentum_error']:,.4g}"] in content["ledger"]
 
 
+def test_times_beyond_the_end_are_told(run, tmp_path):
+    page = tmp_path / "report.html"
+    answer = CliRunner().invoke(app, ["report", str(run), "--times", "1,9", "--out", str(page)])
+    assert answer.exit_code == 0
+    assert answer.stderr == "Left out of --times: 9 s, beyond the last snapshot at t = 3 s.\n"
+    assert page_data(page.read_text())["times"] == [1.0]
+    write_report([Results.open(run)], page)
+    assert page_data(page.read_text())["times"] == [0.5, 1.0, 2.0]
+
+
 def test_several_runs_side_by_side(run, folder, tmp_path, load_scene, flying_points):
     fixed = folder / "fixed"
     scene = load_scene("case_1_fixed", **{"numerics.spacing_m": 0.5, "output.end_time_s": 2.0})
@@ -131,6 +141,7 @@ def test_scripts_are_valid(run, tmp_path):
     ("arguments", "words"),
     [
         (["nowhere"], "nowhere is no folder"),
+        (["RUN", "--times", "9"], "nothing to draw at 9 s: the last snapshot is at t = 3 s"),
         (["RUN", "--times", "1,x"], "'x' must be a number of seconds"),
         (["RUN", "--out", "none/report.html"], "must be a file in a folder that exists"),
     ],

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analytic.whole_file import write_whole
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.purchase import Offer, PurchaseError, aligned, buy, figures_of
 from warp_mpm.accuracy.runner import Result
@@ -119,9 +120,7 @@ def check(
         budget = BUDGET if number % 2 == 0 else None
         path = folder / f"{run_key(scene)}.json"
         if not path.is_file():
-            aside = path.with_suffix(".new")
-            aside.write_text(json.dumps(asdict(_check(scene, budget)), ensure_ascii=False), encoding="utf-8")
-            aside.replace(path)
+            write_whole(path, json.dumps(asdict(_check(scene, budget)), ensure_ascii=False))
         one = Check(**json.loads(path.read_text(encoding="utf-8")))
         on_progress(
             f"{number} of {len(scenes)}: {one.scene}: promised {one.promised_error:.1%} in {one.promised_time:.2g} s, "

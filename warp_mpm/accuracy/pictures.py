@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.transforms import Bbox
 
 from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
@@ -24,7 +26,16 @@ LEAST_ERROR = 1e-4
 SHOWN_BELOW_DOUBT = 5.0
 """How far the panels go on below what the reference is known to; what is less is drawn on the lower edge."""
 
-MARKERS = "osD^v<>P"
+MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^v<>H1x", strict=True))
+"""One for each knob: its points are told apart although there are fewer colours than knobs."""
+
+FORMULA_MARKERS = "*PXphd8"
+
+LABEL_PLACES = (
+    *((3, 4, "left", "bottom"), (-3, 4, "right", "bottom"), (3, -4, "left", "top"), (-3, -4, "right", "top")),
+    *((0, 12, "center", "bottom"), (0, -12, "center", "top"), (0, 20, "center", "bottom"), (0, -20, "center", "top")),
+)
+"""Where a spacing may stand beside its point: offset [points] and alignment, the first choice first."""
 
 PANELS = (
     *("overall", "peak_force", "impulse", "barrier_displacement_final", "barrier_velocity_max", "impact_duration"),
@@ -49,19 +60,22 @@ def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5, fontsize=8)
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()  # only now the points have their places
+    for panel, name in zip(panels, names, strict=False):
+        _name_spacings(panel, study, name)
     return figure
 
 
 def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula]) -> None:
     knobs = [DEFAULT, *(knob for knob in KNOBS if any(row.setting.knob == knob for row in study.rows))]
-    doubt = study.doubt(name)
-    least = max(LEAST_ERROR, doubt / SHOWN_BELOW_DOUBT)
+    doubt, least = study.doubt(name), _least(study, name)
     for number, knob in enumerate(knobs):
         rows = [r for r in study.rows if r.setting.knob == knob and math.isfinite(error_of(r, name))]
         panel.plot(
             [row.time for row in rows],
             [_drawn(error_of(row, name), least) for row in rows],
-            MARKERS[number % len(MARKERS)],
+            MARKERS[knob],
             color=RUN_COLOURS[number % len(RUN_COLOURS)],
             markersize=6 if knob == DEFAULT else 4.5,
             markerfacecolor=None if knob == DEFAULT else "none",
@@ -72,17 +86,11 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
         [r.time for r in best], [_drawn(error_of(r, name), least) for r in best], "o-", color=GREY, linewidth=1.2,
         markersize=11, markerfacecolor="none", zorder=1, label="cheapest choices",
     )  # fmt: skip
-    for row in study.rows:
-        if row.setting.knob == DEFAULT and row.errors:
-            panel.annotate(
-                f"{row.setting.spacing:.3g}", (row.time, _drawn(error_of(row, name), least)), fontsize=7, color=BLUE,
-                xytext=(3, 4), textcoords="offset points",
-            )  # fmt: skip
     for number, formula in enumerate(found):
         error = formula_errors(study, formula).get(name)
         if error is not None:
             panel.plot(
-                formula.time, _drawn(abs(error), least), ("*", "P", "X", "p", "h", "d", "8")[number % 7],
+                formula.time, _drawn(abs(error), least), FORMULA_MARKERS[number % len(FORMULA_MARKERS)],
                 color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
             )  # fmt: skip
     panel.axhspan(least / 2, max(doubt, least), color="#EEEEEE", zorder=0)
@@ -90,6 +98,32 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
     panel.set_title(_title(name), fontsize=9)
     panel.set_xlabel("CPU time", fontsize=8)
     panel.set_ylabel("error (grey: reference unsure)", fontsize=8)
+
+
+def _name_spacings(panel: Axes, study: Study, name: str) -> None:
+    """Spacings beside their points, apart from each other and within the panel, over as few other points as can be."""
+    least = _least(study, name)
+    points = [(r.time, _drawn(error_of(r, name), least)) for r in study.rows if math.isfinite(error_of(r, name))]
+    pixels = panel.transData.transform(points)
+    taken: list[Bbox] = []
+    for row in study.rows:
+        if row.setting.knob != DEFAULT or not row.errors:
+            continue
+        free: list[tuple[int, int, Any, Bbox]] = []
+        for x, y, across, upright in LABEL_PLACES:
+            label = panel.annotate(
+                f"{row.setting.spacing:.3g}", (row.time, _drawn(error_of(row, name), least)), fontsize=7, color=BLUE,
+                xytext=(x, y), textcoords="offset points", ha=across, va=upright, in_layout=False,
+            )  # fmt: skip
+            extent = label.get_window_extent()
+            inside = all(panel.bbox.contains(*corner) for corner in (extent.min, extent.max))
+            if inside and not any(extent.overlaps(other) for other in taken):
+                free.append((extent.padded(2.0).count_contains(pixels), len(free), label, extent))
+            label.set_visible(False)
+        if free:  # else the spacing is left to its neighbours to tell
+            _, _, label, extent = min(free, key=lambda place: place[:2])
+            label.set_visible(True)
+            taken.append(extent)
 
 
 def error_of_each_knob(study: Study) -> Figure:
@@ -228,6 +262,11 @@ def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]])
     return figure
 
 
+def _least(study: Study, name: str) -> float:
+    """The lower edge of a panel, on which lesser errors are drawn."""
+    return max(LEAST_ERROR, study.doubt(name) / SHOWN_BELOW_DOUBT)
+
+
 def _drawn(error: float, least: float = LEAST_ERROR) -> float:
     return max(error, least)
 
@@ -242,7 +281,7 @@ def _logarithmic(panel: Axes, least: float = LEAST_ERROR, *, times: bool = True)
     panel.yaxis.set_minor_formatter(NullFormatter())
     if times:
         low, high = panel.get_xlim()
-        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high / low < 1e3 else (1.0,), numticks=20))
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high / low < 1e2 else (1.0,), numticks=6))
         panel.xaxis.set_major_formatter(FuncFormatter(_time_text))
         panel.xaxis.set_minor_formatter(NullFormatter())
     panel.tick_params(labelsize=8)
@@ -250,6 +289,8 @@ def _logarithmic(panel: Axes, least: float = LEAST_ERROR, *, times: bool = True)
 
 
 def _time_text(seconds: float, _: Any = None) -> str:
+    if seconds >= 1000.0:
+        return f"{seconds:,.0f} s"
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if seconds >= 0.1 * size:
             return f"{seconds / size:.3g} {unit}"

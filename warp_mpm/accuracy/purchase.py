@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from analytic.whole_file import write_whole
 from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder, scene_key
@@ -355,9 +356,7 @@ def write_data(path: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]],
         ]
         if len(rungs) >= 3 and rungs[0].figures:
             found[scene_key(scene)] = {"title": scene.title, "rungs": [rung.__dict__ for rung in rungs]}
-    aside = path.with_name(path.name + ".new")
-    aside.write_text(json.dumps(content | {"scenes": found}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    aside.replace(path)
+    write_whole(path, json.dumps(content | {"scenes": found}, indent=1, ensure_ascii=False) + "\n")
 
 
 def _rung(scenario: Scenario, spacing: float, measure: Callable[[Scenario], Result]) -> Rung:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from analytic.whole_file import write_whole
 from warp_mpm.accuracy import pictures
 from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import formulas
@@ -25,8 +26,8 @@ def write_study(
         ValueError: fewer than three spacings came to their end.
     """
     study, found = evaluate(scenario, settings, results), formulas(scenario)
-    _write(folder / "runs.csv", csv_table(study))
-    _write(folder / "study.md", markdown(study, found))
+    write_whole(folder / "runs.csv", csv_table(study))
+    write_whole(folder / "study.md", markdown(study, found))
     save(pictures.error_against_time(study, found), folder / "error_against_time.png")
     save(pictures.error_of_each_knob(study), folder / "each_setting.png")
     save(pictures.where_time_goes(study), folder / "where_time_goes.png")
@@ -67,7 +68,7 @@ def put_into_page(page: Path, name: str, block: str, pictures: Sequence[Path]) -
         target = folder / f"{name}_{picture.name}"
         target.write_bytes(picture.read_bytes())
         shown += [f"![{name}, {picture.stem.replace('_', ' ')}](images/accuracy/{target.name})", ""]
-    _write(page, "\n".join([before, "", *shown, block.rstrip(), "", after]))
+    write_whole(page, "\n".join([before, "", *shown, block.rstrip(), "", after]))
 
 
 def place_in(page: Path, name: str) -> tuple[str, str]:
@@ -106,7 +107,7 @@ def write_ladders(
             lines.append(f"| | {formula.name} | {formula.time * 1e6:.2g} µs | " + " | ".join(cells) + " |")
     table = "\n".join(lines) + "\n"
     about = "# The price of the closed form\n\nErrors against the converged simulation.\n\n"
-    _write(folder / "closed_form.md", about + table)
+    write_whole(folder / "closed_form.md", about + table)
     return table
 
 
@@ -121,9 +122,3 @@ def _reference_line(study: Study) -> str:
         cells.append(f"{reference.value * quantity.factor:.3g} {quantity.unit} ± {doubt:.0%}")
     dearest = max(row.time for row in study.rows)
     return f"| {study.scenario.title} | simulation | {dearest:.2g} s | " + " | ".join(cells) + " |"
-
-
-def _write(path: Path, text: str) -> None:
-    aside = path.with_name(path.name + ".new")
-    aside.write_text(text, encoding="utf-8")
-    aside.replace(path)

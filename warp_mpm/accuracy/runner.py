@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analytic.whole_file import write_whole
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.study import Setting
 from warp_mpm.scenario import Scenario
@@ -105,10 +106,7 @@ def run_settings(
 def run_setting(scenario: dict[str, Any], path: str) -> Result:
     """Run one setting in a worker and write its result, whole or not at all."""
     result = measure(Scenario.model_validate(scenario), profile=True)
-    target = Path(path)
-    aside = target.with_suffix(".new")
-    aside.write_text(json.dumps(result), encoding="utf-8")
-    aside.replace(target)
+    write_whole(Path(path), json.dumps(result))
     return result
 
 

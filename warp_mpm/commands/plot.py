@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from warp_mpm.commands.refusals import refusals, times_of
+from warp_mpm.commands.refusals import DEFAULT_TIMES, refusals, times_of, times_within
 
 
 class Kind(StrEnum):
@@ -39,7 +39,10 @@ def plot(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A png, pdf or svg file.", show_default="KIND.png here")
     ] = None,
-    times: Annotated[str, typer.Option(help="Of field: times [s], with commas between.")] = "1,2,4",
+    times: Annotated[
+        str | None,
+        typer.Option(help="Of field: times [s], with commas between.", show_default=DEFAULT_TIMES),
+    ] = None,
     field: Annotated[
         str,
         typer.Option(
@@ -60,7 +63,7 @@ def plot(
         typer.echo(str(target))
 
 
-def _figure(kind: Kind, paths: list[Path], times: tuple[float, ...], field: str) -> Any:
+def _figure(kind: Kind, paths: list[Path], times: tuple[float, ...] | None, field: str) -> Any:
     from warp_mpm import plotting
     from warp_mpm.results import Results
     from warp_mpm.scenario import Scenario
@@ -74,4 +77,4 @@ def _figure(kind: Kind, paths: list[Path], times: tuple[float, ...], field: str)
         return plotting.comparison(runs)
     if kind is Kind.MECHANISM:
         return plotting.mechanism_diagram(runs)
-    return plotting.field_panels(runs, field, times)
+    return plotting.field_panels(runs, field, times_within(runs, times))

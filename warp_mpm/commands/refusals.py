@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from analytic.command_line import CommandLine
@@ -9,10 +10,14 @@ from analytic.command_line import complain as complain
 from analytic.command_line import refusals as refusals
 
 if TYPE_CHECKING:
+    from warp_mpm.results import Results
     from warp_mpm.scenario import Scenario
 
 FIELDS = {"spacing": "numerics.spacing_m", "until": "output.end_time_s"}
 """Options that stand in place of a field of the scenario."""
+
+DEFAULT_TIMES = "a sixth, a third and two thirds of the run"
+"""What a help text says of `plotting.still_times` that are not given."""
 
 
 class ScenarioCommandLine(CommandLine):
@@ -45,12 +50,14 @@ def with_options(scenario: Scenario, *, spacing: float | None, until: float | No
         raise ScenarioError(text.split("\n")) from None
 
 
-def times_of(text: str) -> tuple[float, ...]:
-    """Times [s] from a list with commas.
+def times_of(text: str | None) -> tuple[float, ...] | None:
+    """Times [s] from a list with commas; None where none is given.
 
     Raises:
         ValueError: an entry is no number from 0 on.
     """
+    if text is None:
+        return None
     times = []
     for word in text.split(","):
         try:
@@ -61,3 +68,19 @@ def times_of(text: str) -> tuple[float, ...]:
             raise ValueError(f"--times {text}: {word.strip()!r} must be a number of seconds at least 0.")
         times.append(time)
     return tuple(times)
+
+
+def times_within(runs: Sequence[Results], times: tuple[float, ...] | None) -> list[float]:
+    """Times [s] of still pictures; a line on standard error names those that the runs do not reach.
+
+    Raises:
+        ResultsError: the runs reach none of them.
+    """
+    from warp_mpm.plotting import still_times
+
+    within = still_times(runs, times)
+    beyond = [f"{time:g}" for time in times or () if time not in within]
+    if beyond:
+        end = max(float(results.snapshots.times[-1]) for results in runs)
+        complain(f"Left out of --times: {', '.join(beyond)} s, beyond the last snapshot at t = {end:g} s.")
+    return within

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals, times_of
+from warp_mpm.commands.refusals import DEFAULT_TIMES, refusals, times_of, times_within
 
 
 def report(
@@ -20,7 +20,10 @@ def report(
             show_default="report.html in the run folder; of several, comparison.html here",
         ),
     ] = None,
-    times: Annotated[str, typer.Option(help="Times of the still pictures [s], with commas between.")] = "1,2,4",
+    times: Annotated[
+        str | None,
+        typer.Option(help="Times of the still pictures [s], with commas between.", show_default=DEFAULT_TIMES),
+    ] = None,
 ) -> None:
     """Write one HTML page that tells and shows all of a run, or of several side by side.
 
@@ -38,5 +41,5 @@ def report(
             raise ValueError(f"--out {target} must be a file in a folder that exists.")
         from warp_mpm.report import write_report
 
-        write_report(results, target, times=wanted)
+        write_report(results, target, times=times_within(results, wanted))
         typer.echo(f"{target} ({target.stat().st_size / 1e6:.2g} MB)")

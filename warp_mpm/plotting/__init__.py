@@ -5,6 +5,7 @@ from warp_mpm.plotting.curves import force_and_displacement as force_and_displac
 from warp_mpm.plotting.mechanism import mechanism_diagram as mechanism_diagram
 from warp_mpm.plotting.points import field_panels as field_panels
 from warp_mpm.plotting.points import pore_pressure as pore_pressure
+from warp_mpm.plotting.points import still_times as still_times
 from warp_mpm.plotting.scene import scene as scene
 from warp_mpm.plotting.style import PlotError as PlotError
 from warp_mpm.plotting.style import check_path as check_path
@@ -20,4 +21,5 @@ __all__ = [
     "pore_pressure",
     "save",
     "scene",
+    "still_times",
 ]

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid
+from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid, heading
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Fixed
 from warp_mpm.summary import FILTER_WINDOW, moving_mean
+
+GOING = {"sliding": "sliding", "prescribed": "driven"}
+"""What a barrier of each kind of motion does where it has not come to rest."""
+
+NARROW_LEGEND = {"columnspacing": 1.2, "handlelength": 1.5, "handletextpad": 0.5}
 
 
 def force_and_displacement(results: Results) -> Figure:
@@ -25,9 +31,9 @@ def force_and_displacement(results: Results) -> Figure:
     time = series["time"]
     moves = not isinstance(scenario.barrier.motion, Fixed)
     rows = 3 if moves else 2
-    figure = Figure(figsize=(7.5, 2.0 + 2.0 * rows), layout="constrained")
+    figure = Figure(figsize=(7.5, 2.5 + 2.0 * rows), layout="constrained")
     axes = figure.subplots(rows, 1, sharex=True, height_ratios=[2.0] + [1.0] * (rows - 1))
-    figure.suptitle(scenario.title, fontsize=11)
+    heading(figure, scenario.title)
 
     forces = axes[0]
     raw = series["impact_force_x"] / 1e3
@@ -44,28 +50,34 @@ def force_and_displacement(results: Results) -> Figure:
             forces.plot(time, moving_mean(time, series[name]) / 1e3, color=colour, linestyle=style, label=label)
     peak = int(np.argmax(filtered))
     forces.plot(time[peak], filtered[peak], "o", color=BLUE, markersize=4)
+    late = time[peak] > 0.5 * (time[0] + time[-1])
     forces.annotate(
         f"{filtered[peak]:.0f} kN/m at {time[peak]:.2f} s",
         (time[peak], filtered[peak]),
-        xytext=(8, 2),
+        xytext=(-8 if late else 8, 2),
         textcoords="offset points",
+        ha="right" if late else "left",
         fontsize=9,
     )
-    forces.set_ylabel("force [kN/m]")
+    forces.set_ylabel(f"force [kN/m],\nmean over {FILTER_WINDOW:g} s")
     forces.axhline(0.0, color=GREY, linewidth=0.6)
-    forces.legend(fontsize=9, title=f"means over {FILTER_WINDOW:g} s", title_fontsize=8)
+    # Above the panel: within it, no corner is free of curves in every run.
+    forces.legend(fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, **NARROW_LEGEND)
 
     if moves:
         moved = axes[1]
         displacement = series["barrier_displacement"]
         moved.plot(time, displacement, color=BLUE)
         moved.set_ylabel("barrier\ndisplacement [m]")
+        going = "" if series["barrier_velocity"][-1] == 0.0 else f", still {GOING[scenario.barrier.motion.kind]}"
+        moved.margins(y=0.25)
         moved.annotate(
-            f"{displacement[-1]:.2f} m",
-            (time[-1], displacement[-1]),
-            xytext=(-4, -12),
+            f"{displacement[-1]:.2f} m{going}",
+            (time[-1], displacement.max()),  # not on the curve, wherever it goes
+            xytext=(-4, 3),
             textcoords="offset points",
             ha="right",
+            va="bottom",
             fontsize=9,
         )
     energy = axes[-1]
@@ -88,9 +100,12 @@ COMPARED = (
     ("top_force", "friction on the crest\n$F_3$ [kN/m]", 1e-3),
     ("base_force", "friction at the base\n$F_4$ [kN/m]", 1e-3),
     ("barrier_displacement", "barrier displacement\n$\\Delta x$ [m]", 1.0),
-    ("flow_kinetic_energy", "kinetic energy: flow (solid),\nbarrier (dashed) [kJ/m]", 1e-3),
+    ("flow_kinetic_energy", "kinetic energy of the flow\n[kJ/m]", 1e-3),
 )
 """Column, label and factor of each panel of `comparison`."""
+
+ALWAYS_COMPARED = ("impact_force_x", "flow_kinetic_energy")
+"""Columns whose panel is there even where they are nil in all runs."""
 
 
 def comparison(runs: Sequence[Results]) -> Figure:
@@ -102,12 +117,21 @@ def comparison(runs: Sequence[Results]) -> Figure:
     series = [results.time_series for results in runs]
     if not any("impact_force_x" in one for one in series):
         raise ResultsError(f"{runs[0].path} has no barrier, so there is no impact force to draw.")
-    figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-    axes = figure.subplots(3, 2, sharex=True).ravel()
+    shown = [
+        row
+        for row in COMPARED
+        if row[0] in ALWAYS_COMPARED or any(np.any(columns.get(row[0], 0.0)) for columns in series)
+    ]
+    rows = math.ceil(len(shown) / 2)
+    figure = Figure(figsize=(10.0, 2.7 * rows + 0.9), layout="constrained")
+    axes = figure.subplots(rows, 2, sharex=True).ravel()
+    for panel in axes[len(shown) :]:
+        panel.remove()
+    axes = axes[: len(shown)]
     for number, (results, columns) in enumerate(zip(runs, series, strict=True)):
         colour = RUN_COLOURS[number % len(RUN_COLOURS)]
         time = columns["time"]
-        for panel, (name, _, factor) in zip(axes, COMPARED, strict=True):
+        for panel, (name, _, factor) in zip(axes, shown, strict=True):
             if name not in columns:
                 continue
             values = columns[name] if name not in FORCE_COLUMNS else moving_mean(time, columns[name])
@@ -115,12 +139,14 @@ def comparison(runs: Sequence[Results]) -> Figure:
             panel.plot(time, values * factor, color=colour, linewidth=1.2, label=label)
         if np.any(columns.get("barrier_kinetic_energy", 0.0)):
             axes[-1].plot(time, columns["barrier_kinetic_energy"] / 1e3, color=colour, linewidth=1.2, linestyle="--")
-    for panel, (_, label, _) in zip(axes, COMPARED, strict=True):
+            axes[-1].set_title("flow (solid), barrier (dashed)", fontsize=9)
+    for panel, (_, label, _) in zip(axes, shown, strict=True):
         panel.set_ylabel(label)
         panel.axhline(0.0, color=GREY, linewidth=0.6)
         grid(panel)
     for panel in axes[-2:]:
         panel.set_xlabel("time [s]")
+        panel.tick_params(labelbottom=True)
     figure.legend(loc="outside lower center", ncols=2, fontsize=8, title=f"forces are means over {FILTER_WINDOW:g} s")
     return figure
 

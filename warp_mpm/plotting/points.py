@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,41 +14,64 @@ from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patches import Rectangle
 
 from warp_mpm.fields import Field, colour_limits, field_named, field_values
-from warp_mpm.plotting.style import BARRIER, EDGE, GREY, GROUND
+from warp_mpm.plotting.style import BARRIER, EDGE, GREY, GROUND, heading
 from warp_mpm.results import Results, ResultsError, Snapshot
 from warp_mpm.scenario import Scenario, Trapezoid
 
-PRESSURE_TIMES = (1.0, 2.0, 4.0)
-"""Times [s] of the paper's Figs. 4 to 6."""
+STILL_SHARES = (1 / 6, 1 / 3, 2 / 3)
+"""Times of still pictures as shares of a run; of the paper's 6 s they are 1, 2 and 4 s, as in its Figs. 4 to 6."""
+
+LETTER = 0.085
+"""Mean width of a letter of a label [inches], rounded up."""
 
 Window = tuple[float, float, float, float]
 """left, right, bottom, top [m]."""
 
 
-def pore_pressure(results: Results, times: Sequence[float] = PRESSURE_TIMES) -> Figure:
+def pore_pressure(results: Results, times: Sequence[float] | None = None) -> Figure:
     """The flow at several times, coloured by pore pressure, a dry one by its speed; see `field_panels`."""
     wet = "pore_pressure" in results.snapshots.names
     return field_panels([results], "pore_pressure" if wet else "speed", times)
 
 
-def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] = PRESSURE_TIMES) -> Figure:
+def still_times(runs: Sequence[Results], times: Sequence[float] | None = None) -> list[float]:
+    """Times [s] of still pictures, less those after the last snapshot of the longest run.
+
+    Args:
+        runs: at least one.
+        times: [s] that are wanted; None for the snapshots nearest to `STILL_SHARES`.
+
+    Raises:
+        ResultsError: a run holds no snapshot, or all times lie beyond the end.
+    """
+    for results in runs:
+        if len(results.snapshots) == 0:
+            raise ResultsError(f"{results.path} holds no snapshot to draw.")
+    there = max((results.snapshots.times for results in runs), key=lambda one: float(one[-1]))
+    end = float(there[-1])
+    if times is None:
+        return sorted({float(there[np.argmin(np.abs(there - share * end))]) for share in STILL_SHARES})
+    within = [time for time in times if time <= end + 1e-9]
+    if not within:
+        asked = ", ".join(f"{time:g}" for time in times)
+        raise ResultsError(f"There is nothing to draw at {asked} s: the last snapshot is at t = {end:g} s.")
+    return within
+
+
+def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] | None = None) -> Figure:
     """The flow at several times, coloured by a field, one column for each run (the paper's Figs. 4 to 6).
 
     Args:
         runs: at least one.
         name: of a field, see `warp_mpm.fields`.
-        times: [s]; those after the end of all runs are left out, and if none is left, the last snapshot is drawn.
+        times: [s], see `still_times`; those after the end of all runs are left out.
 
     Raises:
-        ResultsError: the snapshots cannot be read, or a run has no such field.
+        ResultsError: the snapshots cannot be read, all times lie after their end, or a run has no such field.
         ValueError: the field is not known.
     """
     field = field_named(name)
-    for results in runs:
-        if len(results.snapshots) == 0:
-            raise ResultsError(f"{results.path} holds no snapshot to draw.")
-    end = max(float(results.snapshots.times[-1]) for results in runs)
-    wanted = [time for time in times if time <= end + 1e-9] or [end]
+    wanted = still_times(runs, times)
     frames = [[results.snapshots.at(time) for time in wanted] for results in runs]
     values = [[shown(results, frame, field) for frame in row] for results, row in zip(runs, frames, strict=True)]
     low, high = colour_limits(np.concatenate([one for row in values for one in row]), field.signed)
@@ -70,19 +94,29 @@ def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] = PR
             panel = axes[row, column]
             drawn = draw_points(panel, frame, values[column][row], field, (low, high))
             draw_surroundings(panel, results.scenario, frame, view)
-            greatest = float(values[column][row].max(initial=0.0))
-            heading = f"t = {frame.time:.2f} s   greatest {field.label.split(',')[0]} {greatest:.3g} {field.unit}"
+            greatest = f"{values[column][row].max(initial=0.0):.3g} {field.unit.strip('-')}"
+            caption = f"t = {frame.time:.2f} s, greatest {greatest.strip()}"
             if row == 0 and len(runs) > 1:
-                heading = f"{results.scenario.title}\n{heading}"
-            panel.set_title(heading, fontsize=9, loc="left")
+                caption = f"{in_lines(results.scenario.title, min(panel_height * aspect, page))}\n{caption}"
+            panel.set_title(caption.replace("$", r"\$"), fontsize=9, loc="left")
             panel.set_ylabel("y [m]" if column == 0 else "")
         axes[-1, column].set_xlabel("x [m]")
     if len(runs) == 1:
-        figure.suptitle(runs[0].scenario.title, fontsize=11)
+        heading(figure, runs[0].scenario.title)
     figure.colorbar(
-        drawn, ax=list(axes.ravel()), label=field.title, extend="both" if field.signed else "max", shrink=0.9, pad=0.01
+        drawn,
+        ax=list(axes.ravel()),
+        label=in_lines(field.title, 0.7 * figure.get_figheight()),
+        extend="both" if field.signed else "max",
+        shrink=0.9,
+        pad=0.01,
     )
     return figure
+
+
+def in_lines(words: str, length: float) -> str:
+    """Words in lines no longer than `length` [inches], for labels that matplotlib itself does not wrap."""
+    return textwrap.fill(words, max(8, int(length / LETTER)), break_on_hyphens=False)
 
 
 def shown(results: Results, frame: Snapshot, field: Field) -> np.ndarray:

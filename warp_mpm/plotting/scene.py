@@ -4,98 +4,166 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patches import Rectangle
 
-from warp_mpm.plotting.style import BARRIER, BLUE, EDGE, GREY, GROUND
+from warp_mpm.plotting.style import BARRIER, BLUE, EDGE, GREY, GROUND, heading
 from warp_mpm.scenario import Scenario, Trapezoid, Wall
+from warp_mpm.scenario.settings import STANDARD_GRAVITY
+
+PAGE, BESIDE, BELOW = 9.0, (0.8, 0.15), 0.55
+"""Width of the figure, and room for what stands to the left, right and below of its panel [inches]."""
+
+TALLEST = 7.0
+"""Greatest height of the panel [inches]."""
+
+STEP, LABEL = 0.26, 3.6
+"""From one line of measures to the next [inches]; the width of a label in such steps."""
 
 
 def scene(scenario: Scenario) -> Figure:
-    """Outline of flow and barrier with depth, length, distance, widths, height and face angle."""
+    """Outline of flow and barrier with depth, length, distance, widths, height and face angle; gravity where tilted."""
     flow = scenario.flow.polygon
-    right, high = float(flow[:, 0].max()), float(flow[:, 1].max())
+    left, right = float(flow[:, 0].min()), float(flow[:, 0].max())
+    bottom, high = min(0.0, float(flow[:, 1].min())), float(flow[:, 1].max())
     shape = scenario.barrier.shape if scenario.barrier is not None else None
+    tilted = scenario.gravity.tilt_deg != 0.0 and scenario.gravity.acceleration_m_per_s2 > 0.0
+    # Room for the measures around what is drawn to scale [steps].
+    before, behind, above, below = 1.5, 1.5, 2.0, 2.0
+    if shape is not None:
+        behind, below = 1.0 + LABEL, 4.6
+        right = max(right, 0.0)
     if isinstance(shape, Trapezoid):
         base, _, height = shape.base_crest_height
         right, high = max(right, base), max(high, height)
-    elif isinstance(shape, Wall):
-        right, high = max(right, 2.5), 1.6 * high
-    left, bottom = float(flow[:, 0].min()), min(0.0, float(flow[:, 1].min()))
-    margin = 0.05 * (right - left)
-    step = 0.035 * (right - left)  # between one line of measures and the next
-    figure = Figure(figsize=(9.0, 9.0 * (high - bottom + 5.0 * step + margin) / (right - left + 2 * margin) + 0.4))
-    figure.set_layout_engine("constrained")
-    panel = figure.subplots()
-    panel.set(
-        xlim=(left - margin, right + margin), ylim=(bottom - 4.5 * step, high + margin + 0.5 * step), aspect="equal"
+    if scenario.flow.speed > 0.0:
+        above += 2.5 * max(0.0, scenario.flow.velocity_m_per_s[1] / scenario.flow.speed)
+    if tilted:
+        above += 3.0
+
+    wide = PAGE - sum(BESIDE)
+    metres_per_inch = max(
+        (right - left) / (wide - STEP * (before + behind)), (high - bottom) / (TALLEST - STEP * (above + below))
     )
-    panel.set_xlabel("x [m]")
-    panel.set_ylabel("y [m]")
+    step = STEP * metres_per_inch
+    spare = 0.5 * (wide * metres_per_inch - (right - left) - step * (before + behind))
+    left, right = left - before * step - spare, right + behind * step + spare
+    floor, ceiling = bottom - below * step, high + above * step
+
+    figure = Figure(figsize=(PAGE, PAGE))
+    panel = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    panel.set(xlim=(left, right), ylim=(floor, ceiling))
     if scenario.ground is not None:
-        panel.axhspan(bottom - 4.5 * step, 0.0, color=GROUND, linewidth=0.0)
+        panel.axhspan(floor, 0.0, color=GROUND, linewidth=0.0)
         panel.axhline(0.0, color=GREY, linewidth=0.8)
     panel.add_patch(PolygonPatch(flow, facecolor="#9CC7E3", edgecolor=BLUE))
-    _flow_measures(panel, scenario, flow, step)
+    _flow_measures(panel, scenario, bottom, step)
     if isinstance(shape, Trapezoid):
         panel.add_patch(PolygonPatch(shape.polygon, facecolor=BARRIER, edgecolor=EDGE))
-        _barrier_measures(panel, shape, step)
+        _barrier_measures(panel, shape, bottom, step)
     elif isinstance(shape, Wall):
-        panel.add_patch(Rectangle((0.0, 0.0), right + margin, 2.0 * high, facecolor=BARRIER, edgecolor=EDGE))
-        panel.text(0.5 * (right + margin), 0.5 * high, "wall\nwithout end", ha="center", va="center", fontsize=9)
+        panel.add_patch(Rectangle((0.0, 0.0), right, ceiling, facecolor=BARRIER, edgecolor=EDGE))
+        panel.text(0.5 * right, 0.5 * high, "wall\nwithout end", ha="center", va="center", fontsize=9)
+    if tilted:
+        _gravity(panel, scenario, (left + 3.0 * step, ceiling - 0.5 * step), step)
+    _set_sizes(figure, panel, (ceiling - floor) / metres_per_inch, scenario)
     return figure
 
 
-def _flow_measures(panel: Axes, scenario: Scenario, flow: np.ndarray, step: float) -> None:
-    material, depth = scenario.flow.material, scenario.flow.depth
-    front, tail = float(flow[:, 0].max()), float(flow[:, 0].min())
-    middle = flow.mean(axis=0)
-    panel.set_title(
-        f"flow: V = {scenario.flow.volume:g} m³/m, n = {material.porosity:g}, ρ = {material.density:,.0f} kg/m³"
-        + ("" if scenario.barrier is None else f"; barrier: {scenario.barrier.motion.kind}"),
-        fontsize=9,
-        loc="left",
-    )
+def _set_sizes(figure: Figure, panel: Axes, tall: float, scenario: Scenario) -> None:
+    """Title and facts above the panel, which is `tall` [inches], and a figure that holds it all.
+
+    By hand: matplotlib's layouts do not know beforehand how tall a panel to scale becomes, and cut its title off.
+    """
+    title = heading(figure, scenario.title)
+    panel.set_position((BESIDE[0] / PAGE, 0.1, 1.0 - sum(BESIDE) / PAGE, 0.5))
+    facts = panel.set_title(_facts(scenario), fontsize=9, loc="left", wrap=True)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    title_tall, facts_tall = (text.get_window_extent(renderer).height / figure.dpi for text in (title, facts))
+    height = BELOW + tall + facts_tall + title_tall + 0.35
+    figure.set_size_inches(PAGE, height)
+    panel.set_position((BESIDE[0] / PAGE, BELOW / height, 1.0 - sum(BESIDE) / PAGE, tall / height))
+    title.set_y(1.0 - 0.1 / height)
+
+
+def _facts(scenario: Scenario) -> str:
+    material, gravity = scenario.flow.material, scenario.gravity.acceleration_m_per_s2
+    facts = [f"flow: V = {scenario.flow.volume:g} m³/m, n = {material.porosity:g}, ρ = {material.density:,.0f} kg/m³"]
+    if scenario.barrier is not None:
+        facts.append(f"barrier: {scenario.barrier.motion.kind}")
+    if scenario.ground is not None:
+        friction = scenario.ground.friction
+        facts.append(f"ground: friction tan $φ_b$ = {friction:g}" if friction > 0.0 else "ground: smooth")
+    if gravity != STANDARD_GRAVITY:
+        facts.append(f"g = {gravity:g} m/s²")
+    return "; ".join(facts)
+
+
+def _flow_measures(panel: Axes, scenario: Scenario, bottom: float, step: float) -> None:
+    flow = scenario.flow.polygon
+    (tail, lowest), (front, highest) = flow.min(axis=0), flow.max(axis=0)
     speed = scenario.flow.speed
     if speed > 0.0:
         along_x, along_y = (2.5 * step * component / speed for component in scenario.flow.velocity_m_per_s)
-        start = (float(middle[0]) - 0.5 * along_x, float(flow[:, 1].max()) + 0.9 * step)
+        start = (float(flow[:, 0].mean()) - 0.5 * along_x, highest + step)
         end = (start[0] + along_x, start[1] + along_y)
         panel.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})
-        panel.text(end[0] + 0.3 * step, end[1], f"{speed:g} m/s", fontsize=9, va="center")
-    _measure(panel, (tail, -step), (front, -step), f"{front - tail:.3g} m")
-    deepest = float(flow[flow[:, 1] == flow[:, 1].max(), 0].mean())
-    _measure(panel, (deepest, float(flow[:, 1].min())), (deepest, float(flow[:, 1].max())), f"h = {depth:g} m")
+        panel.text(max(start[0], end[0]) + 0.3 * step, end[1], f"{speed:.4g} m/s", fontsize=9, va="center")
+    _measure(panel, (tail, bottom - step), (front, bottom - step), f"{front - tail:.3g} m")
+    deepest = float(flow[flow[:, 1] == highest, 0].mean())
+    _measure(panel, (deepest, lowest), (deepest, highest), f"h = {scenario.flow.depth:g} m", step)
     if scenario.barrier is not None and front < -1e-9:
-        _measure(panel, (front, -step), (0.0, -step), f"d = {-front:.3g} m")
+        _measure(panel, (front, bottom - 2.3 * step), (0.0, bottom - 2.3 * step), f"d = {-front:.3g} m")
 
 
-def _barrier_measures(panel: Axes, shape: Trapezoid, step: float) -> None:
+def _barrier_measures(panel: Axes, shape: Trapezoid, bottom: float, step: float) -> None:
     base, crest, height = shape.base_crest_height
     start = 0.5 * (base - crest)
-    _measure(panel, (0.0, -2.9 * step), (base, -2.9 * step), f"B = {base:.3g} m")
+    _measure(panel, (0.0, bottom - 3.6 * step), (base, bottom - 3.6 * step), f"B = {base:.3g} m")
     if crest > 0.0:
         _measure(panel, (start, height + 0.6 * step), (start + crest, height + 0.6 * step), f"b = {crest:.3g} m")
-    middle = start + 0.5 * crest
-    _measure(panel, (middle, 0.0), (middle, height), f"H = {height:.3g} m")
-    angle = shape.built_face_angle_deg
+    # The angle stands in the toe where there is room below the face for it, else it is told beside the height.
+    words, angle = f"H = {height:.3g} m", f"β = {shape.built_face_angle_deg:.1f}°"
+    indent = (start / height + 0.3) * step
+    if height >= step and base >= 2.0 * indent + LABEL * step:
+        panel.text(indent, 0.25 * step, angle, fontsize=9)
+    else:
+        words += f"\n{angle}"
+    beside = max(base + 0.8 * step, 0.5 * base + 1.6 * step)  # clear of the crest's label too
+    panel.plot([start + crest, beside], [height, height], color=EDGE, linewidth=0.6, linestyle=":")
+    _measure(panel, (beside, 0.0), (beside, height), words, step)
+
+
+def _gravity(panel: Axes, scenario: Scenario, start: tuple[float, float], step: float) -> None:
+    """Where gravity points, beside the vertical of the picture."""
+    tilt = scenario.gravity.tilt_deg
+    down = 2.2 * step
+    along = (down * math.sin(math.radians(tilt)), -down * math.cos(math.radians(tilt)))
+    panel.plot([start[0], start[0]], [start[1], start[1] - down], color=GREY, linewidth=0.8, linestyle=":")
+    end = (start[0] + along[0], start[1] + along[1])
+    panel.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": EDGE, "linewidth": 1.6, "shrinkA": 0})
     panel.text(
-        0.9 * step * math.cos(math.radians(angle / 2)) + 0.2 * step,
-        0.25 * step,
-        f"β = {angle:.1f}°",
+        start[0] + max(along[0], 0.0) + 0.5 * step,
+        start[1] - 0.5 * down,
+        f"g, tilted by {abs(tilt):g}°: the ground falls toward {'+x' if tilt > 0.0 else '-x'}",
         fontsize=9,
+        va="center",
     )
 
 
-def _measure(panel: Axes, start: tuple[float, float], end: tuple[float, float], words: str) -> None:
+def _measure(panel: Axes, start: tuple[float, float], end: tuple[float, float], words: str, room: float = 0.0) -> None:
+    """An arrow with two heads; its label above, or beside an upright one, which may be lower than the `room` [m] that
+    a label takes."""
     panel.annotate(
         "", end, start, arrowprops={"arrowstyle": "<->", "color": EDGE, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     )
     level = start[1] == end[1]
     place = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
+    if not level:
+        place = (place[0], max(place[1], start[1] + 0.35 * room * (1 + words.count("\n"))))
     panel.annotate(
         words,
         place,

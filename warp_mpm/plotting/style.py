@@ -7,6 +7,9 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from analytic.whole_file import whole_file
 
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#6E6E6E"
 RUN_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#000000", GREY)
@@ -33,15 +36,19 @@ def check_path(path: Path, formats: tuple[str, ...] = FORMATS) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure in the format of its suffix, whole or not at all."""
-    aside = path.with_name(path.name + ".new")
+    """Write a figure in the format of its suffix, whole or not at all.
+
+    Raises:
+        UnwrittenError: the file cannot be written.
+    """
     FigureCanvasAgg(figure)
-    try:
+    with whole_file(path) as aside:
         figure.savefig(aside, dpi=150, format=path.suffix.lstrip(".").lower())
-        aside.replace(path)
-    except OSError:
-        aside.unlink(missing_ok=True)
-        raise
+
+
+def heading(figure: Figure, title: str) -> Text:
+    """A scenario's title above its figure, in as many lines as it takes; a dollar in it begins no formula."""
+    return figure.suptitle(title.replace("$", r"\$"), fontsize=11, wrap=True)
 
 
 def grid(panel: Axes) -> None:

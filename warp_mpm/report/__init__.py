@@ -3,7 +3,6 @@
 write_report([Results.open("runs/set_iib")], Path("report.html"))
 """
 
-from warp_mpm.report.page import DEFAULT_TIMES as DEFAULT_TIMES
 from warp_mpm.report.page import write_report as write_report
 
-__all__ = ["DEFAULT_TIMES", "write_report"]
+__all__ = ["write_report"]

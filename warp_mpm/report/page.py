@@ -16,14 +16,12 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from analytic.whole_file import whole_file
 from warp_mpm import plotting
 from warp_mpm.recording.run_folder import finite
 from warp_mpm.report.content import run_content
 from warp_mpm.report.points import packed
-from warp_mpm.results import Results, ResultsError
-
-DEFAULT_TIMES = (1.0, 2.0, 4.0)
-"""Times [s] of the still pictures, those of the paper's Figs. 4 to 6."""
+from warp_mpm.results import Results
 
 POINT_BUDGET = 10_000_000
 """Most bytes of point data of all runs together before compression, which makes at most 13.4 MB of text."""
@@ -32,33 +30,32 @@ ASSETS = Path(__file__).parent / "assets"
 COLOURS = {"sequential": "viridis", "signed": "RdBu_r"}
 
 
-def write_report(runs: Sequence[Results], target: Path, *, times: Sequence[float] = DEFAULT_TIMES) -> None:
+def write_report(runs: Sequence[Results], target: Path, *, times: Sequence[float] | None = None) -> None:
     """Write the page of one run, or of several side by side, whole or not at all.
 
     Args:
         runs: at least one.
         target: the HTML file; one that is there is replaced.
-        times: [s] of the still pictures; those after the end of a run are left out, if all are, its last one is shown.
+        times: [s] of the still pictures, see `plotting.still_times`; those after the end of all runs are left out.
 
     Raises:
-        ResultsError: a run cannot be read, or has no snapshot.
-        OSError: the file cannot be written.
+        ResultsError: a run cannot be read, has no snapshot, or all times lie after the end.
+        UnwrittenError: the file cannot be written.
     """
     names = _distinct_names(runs)
+    stills = plotting.still_times(runs, times)
     contents, blobs = [], []
     for results, name in zip(runs, names, strict=True):
-        with results.snapshots as snapshots:
-            if len(snapshots) == 0:
-                raise ResultsError(f"{results.path} holds no snapshot, so there is nothing to show yet.")
+        with results.snapshots:
             content = run_content(results, name)
-            content["points"], blob = packed(results, POINT_BUDGET // len(runs), times)
+            content["points"], blob = packed(results, POINT_BUDGET // len(runs), stills)
         content["scene"] = _svg(plotting.scene(results.scenario))
         contents.append(content)
         blobs.append(blob)
     title = contents[0]["title"] if len(runs) == 1 else " · ".join(names)
     data = {
         "runs": contents,
-        "times": _still_times(times, contents),
+        "times": stills,
         "colours": {kind: _palette(name) for kind, name in COLOURS.items()},
     }
     page = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
@@ -72,24 +69,14 @@ def write_report(runs: Sequence[Results], target: Path, *, times: Sequence[float
         script="\n".join((ASSETS / name).read_text(encoding="utf-8") for name in ("points.js", "charts.js", "page.js")),
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
-    aside = target.with_name(target.name + ".new")
-    try:
+    with whole_file(target) as aside:
         aside.write_text(page, encoding="utf-8")
-        aside.replace(target)
-    except OSError:
-        aside.unlink(missing_ok=True)
-        raise
 
 
 def _distinct_names(runs: Sequence[Results]) -> list[str]:
     """Folder names, or whole paths where two runs have the same."""
     names = [results.path.resolve().name for results in runs]
     return names if len(set(names)) == len(names) else [str(results.path) for results in runs]
-
-
-def _still_times(times: Sequence[float], contents: Sequence[dict[str, Any]]) -> list[float]:
-    end = max(content["points"]["times"][-1] for content in contents)
-    return [time for time in times if time <= end + 1e-9] or [end]
 
 
 def _embedded(data: Any) -> str:

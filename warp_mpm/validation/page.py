@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from analytic.whole_file import write_whole
 from warp_mpm.plotting.style import GREY, RUN_COLOURS, grid, save
 from warp_mpm.validation.case import Case, Check, Outcome, Panel, number
 
@@ -61,9 +62,7 @@ def write(folder: Path, results: Sequence[Result], *, quick: bool, versions: str
     for result in results:
         lines += ["", *_section(result, pictures)]
     page = folder / PAGE
-    aside = page.with_name(page.name + ".new")
-    aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    aside.replace(page)
+    write_whole(page, "\n".join(lines) + "\n")
     return page
 
 

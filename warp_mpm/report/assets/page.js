@@ -137,10 +137,10 @@ async function start() {
     canvas.setAttribute("aria-label", "material points of " + cloud.run.name);
     box.appendChild(canvas);
     const {frame_stride: frames, point_stride: points} = cloud.points;
+    const share = (stride, what) => stride > 1 ? `one in ${stride} ${what}` : `all ${what}`;
     if (frames > 1 || points > 1) {
       box.appendChild(Object.assign(document.createElement("p"), {className: "hint", textContent:
-        `Of the snapshots every ${frames > 1 ? frames + "th" : ""} one, of the points every ${points}th is shown here; ` +
-        "all are in the run folder."}));
+        `Shown here: ${share(frames, "snapshots")}, ${share(points, "points")}; all are in the run folder.`}));
     }
     return canvas;
   });
