@@ -226,7 +226,14 @@ def _print_comparison(found: CrossCheck) -> None:
 
     header = ["", *(f"{label} [{unit}]" for label, unit, _ in FIGURES.values()), *(f"rms {s}" for s in CURVES.values())]
     rows = [
-        ["simulation", *(number(factor * found.figures[key]) for key, (_, _, factor) in FIGURES.items()), "", "", ""]
+        [
+            "simulation",
+            *(
+                ("≥ " if key in found.at_least else "") + number(factor * found.figures[key])
+                for key, (_, _, factor) in FIGURES.items()
+            ),
+            *("" for _ in CURVES),
+        ]
     ]
     for comparison in found.comparisons:
         cells = []
@@ -250,7 +257,7 @@ def _print_comparison(found: CrossCheck) -> None:
     ]
     notes += [
         f"Simulated force: {found.filter_rule}. rms: over the largest simulated value.",
-        *found.scene.remarks,
+        *found.notes,
     ]
     print_table(found.title, header, rows, notes)
 
