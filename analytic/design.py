@@ -46,7 +46,7 @@ class Bounds:
         for name, value, inside, allowed in (
             ("height", self.height, self.height > 0, "(0, inf)"),
             ("crest_width", self.crest_width, self.crest_width >= 0, "[0, inf)"),
-            ("density", self.density, self.density > 0, "(0, inf)"),
+            ("density of the barrier", self.density, self.density > 0, "(0, inf)"),
             ("face_angle", low, 0 < low <= 90, "(0, 90]"),
             ("face_angle", high, low <= high <= 90, f"[{low:g}, 90]"),
         ):

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from warp_mpm.commands.refusals import ScenarioCommandLine, with_options
+
 if TYPE_CHECKING:
     from fmu.cross_check import CrossCheck
 
-FAILED, BAD_INPUT = 1, 2
+FAILED = 1
 DEFAULT_FOLDER = Path("build/fmu")
 
 app = typer.Typer(
+    cls=ScenarioCommandLine,
     help="FMI 2.0 co-simulation units of the closed-form model and of the simulator.",
     no_args_is_help=True,
     add_completion=False,
@@ -56,16 +59,19 @@ def build(
     chosen = only or names
     unknown = [name for name in chosen if name not in names]
     if unknown:
-        _refuse(f"--only is {unknown[0]}, it must be one of {', '.join(names)}.")
+        _refuse(f"--only = {unknown[0]} is not allowed; it must be one of {', '.join(names)}.")
     if scenario is not None:
         _check_scenario(scenario)
     _check_folder(out)
     try:
+        if c_unit.INTERFACE.name in chosen:  # first, because it is the one that may lack what it needs
+            built = c_unit.build_c_unit(out, platforms=tuple(platform) if platform else None)
+            _tell(built, f"for {', '.join(c_unit.platforms_of(built))}")
+            if platform is None and not c_unit.has_cross_compiler():
+                typer.echo(f"{built.name} for other platforms {c_unit.NEEDS_CROSS_COMPILER}.", err=True)
         for unit in archive.PYTHON_UNITS:
             if unit.name in chosen:
                 _tell(archive.build_python_unit(unit, out, scenario=scenario, simulate_reference=True))
-        if c_unit.INTERFACE.name in chosen:
-            _tell(c_unit.build_c_unit(out, platforms=tuple(platform) if platform else None))
     except archive.BuildError as error:
         _refuse(str(error))
     except OSError as error:
@@ -86,7 +92,7 @@ def check(
             show_default="all units, freshly built",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for a scenario's figure and table.", show_default=True)] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for a scenario's figure (png) and table (md).")] = Path(
         "build/check"
     ),
     spacing: Annotated[float | None, typer.Option(help="Grid spacing [m].", show_default="the scenario's")] = None,
@@ -197,31 +203,37 @@ def _compare(
     as_json: bool,
 ) -> None:
     from analytic import plots
-    from analytic.cli.terminal import print_json  # noqa: F401 - an import error must come before the simulation
+    from analytic.cli.terminal import print_table
     from fmu.cross_check import cross_check
     from fmu.figure import cross_check_figure
     from warp_mpm import Scenario
 
-    changes: dict[str, object] = {}
-    if spacing is not None:
-        changes["numerics.spacing_m"] = spacing
-    if until is not None:
-        changes["output.end_time_s"] = until
     try:
-        scenario = Scenario.load(file).replaced(changes)
+        scenario = with_options(Scenario.load(file), spacing=spacing, until=until)
         found = cross_check(scenario, unit, device=device, on_progress=None if as_json else _Progress(scenario).show)
     except ValueError as error:  # of the scenario, the device, the closed form or the calibration: one sentence each
         _refuse(str(error))
-    picture = out / f"{file.stem}.png"
-    plots.save(cross_check_figure(found), picture)
-    content.append({"scenario": str(file), "figure": str(picture), **found.as_dict()})
+    picture, written = out / f"{file.stem}.png", out / f"{file.stem}.md"
+    table = _comparison(found)
+    try:
+        plots.save(cross_check_figure(found), picture)
+        written.write_text(_markdown(*table), encoding="utf-8")
+    except OSError as error:
+        _refuse(f"{out} cannot be written: {error.strerror or error}.")
+    content.append({"scenario": str(file), "figure": str(picture), "table": str(written), **found.as_dict()})
     if not as_json:
-        _print_comparison(found)
-        typer.echo(f"Figure: {picture}", err=True)
+        print_table(*table)
+        typer.echo(f"Figure and table: {picture}, {written}", err=True)
 
 
-def _print_comparison(found: CrossCheck) -> None:
-    from analytic.cli.terminal import number, print_table
+def _markdown(title: str, header: list[str], rows: list[list[str]], notes: list[str]) -> str:
+    lines = [f"# {title}", "", *("| " + " | ".join(row) + " |" for row in (header, ["---"] * len(header), *rows))]
+    return "\n".join([*lines, *(f"\n{note}" for note in notes)]) + "\n"
+
+
+def _comparison(found: CrossCheck) -> tuple[str, list[str], list[list[str]], list[str]]:
+    """Title, header, rows and notes of the table."""
+    from analytic.cli.terminal import number
     from fmu.cross_check import CURVES, FIGURES
 
     header = ["", *(f"{label} [{unit}]" for label, unit, _ in FIGURES.values()), *(f"rms {s}" for s in CURVES.values())]
@@ -259,7 +271,7 @@ def _print_comparison(found: CrossCheck) -> None:
         f"Simulated force: {found.filter_rule}. rms: over the largest simulated value.",
         *found.notes,
     ]
-    print_table(found.title, header, rows, notes)
+    return found.title, header, rows, notes
 
 
 class _Progress:
@@ -294,13 +306,12 @@ def _check_folder(folder: Path) -> None:
         _refuse(f"{folder} cannot be made: {error.strerror or error}.")
 
 
-def _tell(path: Path) -> None:
-    typer.echo(f"{path}  {path.stat().st_size / 1000:.0f} kB")
+def _tell(path: Path, remark: str = "") -> None:
+    typer.echo(f"{path}  {path.stat().st_size / 1000:.0f} kB  {remark}".rstrip())
 
 
 def _refuse(sentence: str) -> NoReturn:
-    typer.echo(f"Error: {sentence}", err=True)
-    raise typer.Exit(BAD_INPUT)
+    raise typer.BadParameter(sentence)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import indent, tostring
@@ -33,6 +34,8 @@ PLATFORMS = {
     "darwin64": (".dylib", ("x86_64-macos", "aarch64-macos")),
 }
 """FMI platform: file name extension of its binary, and the targets of the cross-compiler that go into it."""
+
+NEEDS_CROSS_COMPILER = "needs the package ziglang: pip install '.[fmu]'"
 
 _SOURCES = Path(__file__).parent / "c"
 _FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -91,6 +94,13 @@ def build_c_unit(folder: Path, *, platforms: tuple[str, ...] | None = None, vers
 def has_cross_compiler() -> bool:
     """Whether the package ``ziglang`` is installed."""
     return importlib.util.find_spec("ziglang") is not None
+
+
+def platforms_of(unit: Path) -> list[str]:
+    """Platforms for which an archive holds a binary."""
+    with zipfile.ZipFile(unit) as archive:
+        names = [name.split("/") for name in archive.namelist()]
+    return [platform for platform in PLATFORMS if any(name[:2] == ["binaries", platform] for name in names)]
 
 
 def host_platform() -> str:
@@ -158,7 +168,7 @@ def _compile(stage: Path, name: str, target: str) -> bytes:
     elif PLATFORMS[host_platform()][1][0] == target and (compiler := shutil.which("cc") or shutil.which("gcc")):
         command = [compiler, "-s"]
     else:
-        raise BuildError(f"Building for {target} needs the package ziglang: pip install 'warp-mpm-impact[fmu]'.")
+        raise BuildError(f"Building for {target} {NEEDS_CROSS_COMPILER}.")
     if "windows" not in target:
         command += ["-fPIC", "-fvisibility=hidden"]
     libraries = [] if "windows" in target else ["-lm"]

@@ -13,14 +13,18 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from analytic.command_line import BAD_INPUT, complain
 from warp_mpm.commands import register
+from warp_mpm.commands.check import check
+from warp_mpm.commands.refusals import ScenarioCommandLine, with_options
 
 if TYPE_CHECKING:
     from warp_mpm.scenario import Scenario
 
-BAD_INPUT, DIVERGED, INTERRUPTED = 2, 3, 130
+DIVERGED, INTERRUPTED = 3, 130
 
 app = typer.Typer(
+    cls=ScenarioCommandLine,
     help="Debris flows that hit a rigid barrier which may slide, by the two-phase Material Point Method.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -106,11 +110,11 @@ def run(
 
         run_several(scenario_files, out, jobs, _options(device, spacing, until, report, force), quiet, as_json)
         return
-    scenario_file = scenario_files[0] if scenario_files else None
+    scenario_file, ended_before = scenario_files[0] if scenario_files else None, False
     if resume is not None:
         if scenario_file is not None or out is not None or spacing is not None or until is not None or force:
             _refuse("--resume DIR goes on with a run as it was begun; beside it only --device and --quiet are allowed.")
-        folder, scenario = resume, _scenario_of(resume)
+        folder, (scenario, ended_before) = resume, _run_in(resume)
     elif scenario_file is None:
         _refuse("run needs a scenario file, or --resume DIR to go on with an interrupted run.")
     else:
@@ -160,13 +164,13 @@ def run(
     except (RunFolderError, ResultsError) as error:
         _refuse(str(error))
     except SimulationDiverged as error:
-        _complain(
+        complain(
             f"{error} What was computed before is in {folder}, with a state from shortly before the failure; to see it "
             f"fail again: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(DIVERGED) from None
     except OSError as error:
-        _complain(
+        complain(
             f"Cannot write to {folder}: {error.strerror or error}. What was written before is kept; to go on once that "
             f"is mended: python -m warp_mpm run --resume {folder}"
         )
@@ -182,34 +186,19 @@ def run(
         display.summarize(outcome)
         if report and not quiet:
             typer.echo(f"The report is {folder / 'report.html'}")
+    if ended_before and not quiet:
+        typer.echo(f"The run in {folder} had finished before; nothing was left to simulate.", err=True)
     if offer is not None and outcome.finished and not quiet:
         typer.echo(offer.settled(folder, time.process_time() - probing), err=True)
     if not outcome.finished:
-        _complain(
+        complain(
             f"Stopped at t = {outcome.summary['end_time']:.3f} s; everything up to there is in {folder}. "
             f"To run it to the end: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(INTERRUPTED)
 
 
-@app.command(epilog="Example: python -m warp_mpm check scenarios/*.json")
-def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
-) -> None:
-    """Check scenario files and tell what they describe; nothing is run or written."""
-    from warp_mpm.scenario import Scenario
-    from warp_mpm.scenario_errors import ScenarioError
-    from warp_mpm.terminal import described
-
-    failed = False
-    for file in files:
-        try:
-            typer.echo(f"{file}: {described(Scenario.load(file))}")
-        except ScenarioError as error:
-            failed = True
-            _complain(str(error))
-    if failed:
-        raise typer.Exit(BAD_INPUT)
+app.command(epilog="Example: python -m warp_mpm check scenarios/*.json")(check)
 
 
 @app.command(epilog="Example: python -m warp_mpm schema > scenario.schema.json")
@@ -235,28 +224,23 @@ def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenari
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
-    changes = {"numerics.spacing_m": spacing, "output.end_time_s": until}
     try:
-        return Scenario.load(file).replaced({path: value for path, value in changes.items() if value is not None})
+        return with_options(Scenario.load(file), spacing=spacing, until=until)
     except ScenarioError as error:
         _refuse(str(error))
 
 
-def _scenario_of(folder: Path) -> Scenario:
-    """The scenario of the run in a folder."""
+def _run_in(folder: Path) -> tuple[Scenario, bool]:
+    """The scenario of the run in a folder, and whether the run has finished."""
     from warp_mpm.results import Results, ResultsError
     from warp_mpm.scenario_errors import ScenarioError
 
     try:
-        return Results.open(folder).scenario
+        results = Results.open(folder)
+        return results.scenario, results.record.get("status") == "finished"
     except (ResultsError, ScenarioError) as error:
         _refuse(str(error))
 
 
 def _refuse(sentence: str) -> NoReturn:
-    _complain(sentence)
-    raise typer.Exit(BAD_INPUT)
-
-
-def _complain(sentence: str) -> None:
-    typer.secho(sentence, err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+    raise typer.BadParameter(sentence)

@@ -171,7 +171,16 @@ class Results:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Key figures of the run."""
+        """Key figures of the run.
+
+        Raises:
+            ResultsError: the run has not come to its end, or the file is damaged.
+        """
+        if not (self.path / run_folder.SUMMARY).exists():
+            raise ResultsError(
+                f"{self.path / run_folder.SUMMARY} is missing: the run has not come to its end; to go on with it: "
+                f"python -m warp_mpm run --resume {self.path}"
+            )
         return self._json(run_folder.SUMMARY)
 
     @cached_property

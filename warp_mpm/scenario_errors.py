@@ -73,13 +73,20 @@ def sentences(error: ValidationError, model: type[BaseModel]) -> list[str]:
     return [sentence for problem in error.errors() for sentence in _sentences_of(problem, model)]
 
 
+def allowed(path: str, model: type[BaseModel]) -> str:
+    """What a field takes, in words, as the sentences have it; `path` as in `numerics.spacing_m`."""
+    return _range_of(_walk(tuple(path.split(".")), model)[1])
+
+
 def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
-    path, annotation, owner, tag = _walk(problem["loc"], model)
-    kind, value = problem["type"], problem["input"]
+    location, kind, value = problem["loc"], problem["type"], problem["input"]
+    if kind == "missing" and isinstance(location[-1], int):  # of a list that is too short the whole is shown
+        location, kind = location[:-1], "too_short"
+    path, annotation, owner, tag = _walk(location, model)
     if kind == "missing":
         yield f"{path} is missing; it must be given{_range_of(annotation, ' as ')}."
     elif kind == "extra_forbidden":
-        name = str(problem["loc"][-1])
+        name = str(location[-1])
         known = list(owner.model_fields) if owner is not None else []
         # A name that another kind of scene knows is no slip of the pen.
         close = [] if name in _all_names(model) else difflib.get_close_matches(name, known, n=1)
@@ -96,8 +103,11 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
         for line in str(problem["ctx"]["error"]).split("\n"):
             yield f"{path + ': ' if path else ''}{line}."
     else:
-        allowed = _range_of(annotation) or _plain(problem)
-        yield f"{path or 'The scenario'} = {_shown(value)} is not allowed; it must be {allowed}."
+        words = _range_of(annotation) or _plain(problem)
+        if kind in ("too_short", "too_long") and owner is not None and _is_fixed_list(annotation):
+            meaning = str(owner.model_fields[str(location[-1])].description).rstrip(".")
+            words += f": {meaning[0].lower()}{meaning[1:]}"
+        yield f"{path or 'The scenario'} = {_shown(value)} is not allowed; it must be {words}."
 
 
 def _walk(
@@ -108,9 +118,12 @@ def _walk(
     for part in location:
         if isinstance(part, int):
             path += f"[{part}]"
-            arguments = typing.get_args(_bare(annotation))
+            arguments = typing.get_args(_bare(_members(annotation)[0]))
             annotation = (arguments[0] if Ellipsis in arguments else arguments[part]) if arguments else Any
             owner = None
+            continue
+        if typing.get_origin(_bare(annotation)) is dict:  # of groups by names that the user chooses
+            path, annotation, owner = f"{path}.{part}", typing.get_args(_bare(annotation))[1], None
             continue
         members = [member for member in _members(annotation) if _is_model(member)]
         tagged = [member for member in members if part in _tags_of(member)]
@@ -137,6 +150,12 @@ def _all_names(model: type[BaseModel]) -> set[str]:
 
 def _is_model(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _is_fixed_list(annotation: Any) -> bool:
+    """Whether it is a list of so many entries, each with its own meaning."""
+    bare = _bare(_members(annotation)[0])
+    return typing.get_origin(bare) is tuple and Ellipsis not in typing.get_args(bare)
 
 
 def _bare(annotation: Any) -> Any:

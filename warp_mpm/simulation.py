@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -419,7 +420,9 @@ class Simulation:
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
-        self._last = totals
+        self._last = replace(
+            totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
+        )
         return values
 
     @property
@@ -469,13 +472,16 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        self._last = Totals(state["last.clock"].tolist(), state["last.reactions"].tolist())
+        self._last = Totals(
+            state["last.clock"].tolist(), state["last.reactions"].tolist(), *state["last.seepage"].tolist()
+        )
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
         kept = {
             "last.clock": self._last.clock,
             "last.reactions": self._last.reactions,
+            "last.seepage": [self._last.seepage_power, self._last.seepage_work],
             "initial_momentum": self._initial_momentum,
         }
         return state | {name: np.array(values) for name, values in kept.items()}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mpm import mechanism
 from warp_mpm.results import Snapshots
-from warp_mpm.scenario import Scenario
+from warp_mpm.scenario import Scenario, Sliding
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
@@ -27,6 +27,9 @@ END_SHARE = 0.1
 RESIDUAL_SHARE = 0.1
 """Last share of the run over which the residual force is taken."""
 
+SETTLED_SHARE = 0.05
+"""Share of the peak force below which a residual force has settled, however it changes."""
+
 DEFINITIONS = {
     "peak_force": "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
     "its time is the end of that interval",
@@ -35,13 +38,16 @@ DEFINITIONS = {
     "rise_time": "T1: peak_force_filtered_time less impact_start_time",
     "residual_force": f"mean force over the last {RESIDUAL_SHARE:.0%} of the run",
     "impact_end_time": (
-        f"first time after the peak from which the filtered force, less the residual force, stays below "
-        f"{END_SHARE:.0%} of the filtered peak less the residual force; null if only in the last {RESIDUAL_SHARE:.0%} "
-        "of the run"
+        "first time after the peak from which the filtered force, less the residual force, stays below "
+        f"{END_SHARE:.0%} of the filtered peak less the residual force; null where that is only in the last "
+        f"{RESIDUAL_SHARE:.0%} of the run, or the force has not settled by then: residual_force is above "
+        f"{SETTLED_SHARE:.0%} of the filtered peak and, at the rate of its last change, would change by more than "
+        f"{END_SHARE:.0%} of that peak in as long as the impact has lasted"
     ),
     "impact_duration": "T2: impact_end_time less impact_start_time",
     "impulse": "time integral of the horizontal force on the impacted face over the whole run",
     "impact_impulse": "the same from impact_start_time to impact_end_time",
+    "barrier_displacement_final": "at the end of the run; not final unless barrier_at_rest",
     "pore_pressure_max": (
         "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
         "noise about the mean over a cell"
@@ -55,7 +61,8 @@ DEFINITIONS = {
     "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
     "momentum and the impulse of its weight",
     "energy_error": "greatest energy that appeared beyond what was there at the start less the work done on the "
-    "barrier, over the flow's initial energy; plastic flow and drag only take energy away",
+    "barrier and beyond gravity's work on liquid that seeps, over the flow's initial energy; plastic flow and drag "
+    "only take energy away",
 }
 """How each figure that could be understood in several ways is taken."""
 
@@ -82,7 +89,9 @@ def summarize(
     displacement = series.get("barrier_displacement")
     figures["barrier_displacement_final"] = None if displacement is None else float(displacement[-1])
     velocity = series.get("barrier_velocity")
-    figures["barrier_at_rest"] = None if velocity is None else bool(velocity[-1] == 0.0)
+    figures["barrier_velocity_final"] = None if velocity is None else float(velocity[-1])
+    slides = scenario.barrier is not None and isinstance(scenario.barrier.motion, Sliding)
+    figures["barrier_at_rest"] = bool(velocity[-1] == 0.0) if slides and velocity is not None else None
     if snapshots is not None and len(snapshots) > 0:
         figures |= mechanism.deposit(scenario, snapshots[-1])
         figures["mechanism"], figures["mechanism_measures"] = mechanism.impact_mechanism(scenario, snapshots)
@@ -123,9 +132,15 @@ def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
         "impact_start_time": start,
         "rise_time": float(time[filtered_peak]) - start,
     }
-    tail = float(time[-1] - RESIDUAL_SHARE * (time[-1] - time[0]))
-    residual = float((impulse[-1] - np.interp(tail, time, impulse)) / (time[-1] - tail))
+    tenth = RESIDUAL_SHARE * float(time[-1] - time[0])
+    tail = float(time[-1]) - tenth
+    before, at_tail = np.interp([tail - tenth, tail], time, impulse)
+    residual = float(impulse[-1] - at_tail) / tenth
     figures["residual_force"] = residual
+    # A force that still falls has another residual the longer the run, and with it another end.
+    to_come = abs(residual - float(at_tail - before) / tenth) / tenth * (float(time[-1]) - start)
+    if residual > SETTLED_SHARE * filtered[filtered_peak] and to_come > END_SHARE * filtered[filtered_peak]:
+        return figures
     above = np.flatnonzero(filtered - residual >= END_SHARE * (filtered[filtered_peak] - residual))
     if len(above) > 0 and above[-1] + 1 < len(time) and time[above[-1] + 1] <= tail:
         end = float(time[above[-1] + 1])
@@ -178,7 +193,7 @@ def energy_error(series: Series) -> float | None:
     if any(part not in series for part in parts):
         return None
     total = sum((series[part] for part in parts), np.zeros(len(series["time"])))
-    total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0)
+    total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0) - series.get("seepage_work", 0.0)
     scale = float(sum(abs(series[part][0]) for part in parts))
     return max(0.0, float((total - total[0]).max())) / scale if scale > 0.0 else None
 

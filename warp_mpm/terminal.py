@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import time
+from collections.abc import Mapping
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -13,6 +14,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
+from warp_mpm.results import Results
 from warp_mpm.run import RunOutcome, RunProgress
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Sliding
 
@@ -61,6 +64,8 @@ class RunDisplay:
     def __enter__(self) -> Self:
         self._console.print(self._scenario.title, style="bold")
         self._console.print(f"{described(self._scenario)}; {self._device}", soft_wrap=True)
+        for sentence in scene_caveats(self._scenario):
+            self._console.print(f"Note: {sentence}", soft_wrap=True)
         if self._console.is_terminal and not self._console.quiet:
             self._bar = Progress(
                 SpinnerColumn(),
@@ -101,6 +106,8 @@ class RunDisplay:
         for name, value in summary_rows(outcome.summary):
             table.add_row(Text(name), Text(value))
         self._console.print(table)
+        for sentence in run_caveats(Results.open(outcome.path).record, outcome.summary):
+            self._console.print(f"Note: {sentence}", soft_wrap=True)
         self._console.print(f"Results are in {outcome.path}", soft_wrap=True)
 
 
@@ -147,17 +154,20 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
-        ("peak force F₂ₓ", kilo("peak_force", "kN/m", "peak_force_time")),
-        ("  mean over 0.05 s", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
+        ("peak force F₂ₓ, 0.05 s mean", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
+        ("  over one record", kilo("peak_force", "kN/m", "peak_force_time")),
         ("impulse", kilo("impulse", "kN s/m")),
         ("impact from", plain("impact_start_time", "s", 3)),
         ("rise time T₁, duration T₂", _pair(plain("rise_time", "s", 3), plain("impact_duration", "s", 3))),
         ("pore pressure, greatest", kilo("pore_pressure_max", "kPa", "pore_pressure_max_time")),
-        ("  landing jet included", kilo("pore_pressure_max_anywhere", "kPa", "pore_pressure_max_anywhere_time")),
+        (
+            "  at a single point, noise and all",
+            kilo("pore_pressure_max_anywhere", "kPa", "pore_pressure_max_anywhere_time"),
+        ),
         ("barrier velocity, greatest", plain("barrier_velocity_max", "m/s")),
-        ("barrier displacement", plain("barrier_displacement_final", "m", 3)),
+        ("barrier displacement", displacement(summary)),
         ("volume [m³/m]", ", ".join(volumes) or None),
-        ("mechanism seen", summary.get("mechanism")),
+        ("mechanism seen so far" if impact_goes_on(summary) else "mechanism seen", summary.get("mechanism")),
         ("error of mass", relative("mass_error")),
         ("error of momentum", relative("momentum_error")),
         ("energy created", relative("energy_error")),
@@ -168,6 +178,26 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("wall time", plain("wall_time", "s", 1)),
     ]
     return [(name, value) for name, value in rows if value is not None]
+
+
+def displacement(summary: Mapping[str, Any]) -> str | None:
+    """Sliding distance with its unit, and whether it is final."""
+    value = summary.get("barrier_displacement_final")
+    if value is None:
+        return None
+    still = summary.get("barrier_at_rest") is False
+    return f"{value:,.3f} m" + (f", still sliding at {summary['barrier_velocity_final']:.3g} m/s" if still else "")
+
+
+AT_LEAST = "≥ before Δx: the barrier still slides at the end of the run."
+
+
+def sliding_distance(summary: Mapping[str, Any]) -> str:
+    """Sliding distance [m] for a table, marked where it is not final (`AT_LEAST`)."""
+    value = summary.get("barrier_displacement_final")
+    if value is None:
+        return "–"
+    return ("≥ " if summary.get("barrier_at_rest") is False else "") + f"{value:,.4g}"
 
 
 def _pair(first: str | None, second: str | None) -> str | None:

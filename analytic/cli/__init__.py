@@ -13,8 +13,10 @@ from analytic.cli.design import design
 from analytic.cli.field import field
 from analytic.cli.predict import predict
 from analytic.cli.sweep import sweep
+from analytic.command_line import CommandLine
 
 app = typer.Typer(
+    cls=CommandLine,
     help="Closed-form impact of a debris flow on a rigid barrier which may slide: answers in microseconds.",
     no_args_is_help=True,
     add_completion=False,

@@ -118,6 +118,9 @@ def choose_model(scene: Scene, variant: str, given: dict[str, float | None]) -> 
     ``given``: what the user states of s1max, geometry_change, rise_ratio and vertical_load_ratio; it goes before the
     fitted or assumed values.
     """
+    known = [*VARIANTS, CALIBRATED]
+    if variant not in known:
+        raise ValueError(f"variant is {variant!r}, it must be one of {', '.join(known)}.")
     stated = {name: value for name, value in given.items() if value is not None}
     lambda_stated = "s1max" in stated or "geometry_change" in stated
     if variant == CALIBRATED:

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-BAD_INPUT = 2
-"""Exit code of an input that cannot be used."""
+from analytic.command_line import refusals as refusals
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI units per metre of width.")]
 Plot = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a png, pdf or svg file.")
 ]
-
-
-@contextmanager
-def refusals() -> Iterator[None]:
-    """Turn a ValueError, which all bad inputs raise, into its sentence and the exit code 2."""
-    try:
-        yield
-    except ValueError as error:
-        typer.echo(f"Error: {error}", err=True)
-        raise typer.Exit(BAD_INPUT) from None
 
 
 def print_json(content: Any) -> None:

@@ -10,13 +10,18 @@ GroundAnchor holds the barrier by a force that follows from its displacement. Ru
 from __future__ import annotations
 
 import argparse
+import math
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import NoReturn
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+
+UNITS = ("DebrisFlow", "BarrierSliding", "GroundAnchor")
 
 
 class Unit:
@@ -130,16 +135,46 @@ def _pass_forces(flow: Unit, barrier: Unit, tie: Unit) -> None:
     barrier["external_force"] = tie["force"]
 
 
+class Parser(argparse.ArgumentParser):
+    """Refuses with one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{message}.\n".replace("argument ", ""))
+
+
+def number(*, above: float = -math.inf, least: float = -math.inf) -> Callable[[str], float]:
+    """Reads a number that is finite and within its bound."""
+    allowed = f"greater than {above:g}" if above > -math.inf else f"at least {least:g}"
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value > above and value >= least):
+            raise argparse.ArgumentTypeError(f"{text} is not allowed; it must be a finite number {allowed}")
+        return value
+
+    return read
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--archives", type=Path, default=Path("build/fmu"), help="folder with the built units")
-    parser.add_argument("--step", type=float, default=0.005, help="communication step [s]")
-    parser.add_argument("--end", type=float, default=6.0, help="end time [s]")
-    parser.add_argument("--spacing", type=float, default=0.0, help="grid spacing [m]; 0 takes the scenario's")
+    parser.add_argument("--step", type=number(above=0.0), default=0.005, help="communication step [s]")
+    parser.add_argument("--end", type=number(above=0.0), default=6.0, help="end time [s]")
+    parser.add_argument(
+        "--spacing", type=number(least=0.0), default=0.0, help="grid spacing [m]; 0 takes the scenario's"
+    )
     parser.add_argument("--scheme", choices=("gauss-seidel", "jacobi"), default="gauss-seidel")
-    parser.add_argument("--stiffness", type=float, help="stiffness of the anchor [N/m2]; without it there is none")
-    parser.add_argument("--yield-force", type=float, default=150e3, help="yield force of the anchor [N/m]")
+    stiffness = "stiffness of the anchor [N/m2]; without it there is none"
+    parser.add_argument("--stiffness", type=number(least=0.0), help=stiffness)
+    parser.add_argument("--yield-force", type=number(above=0.0), default=150e3, help="yield force of the anchor [N/m]")
     given = parser.parse_args()
+    if given.step > given.end:
+        parser.error(f"--step: {given.step:g} is not allowed; it must be at most --end, {given.end:g}")
+    if not all((given.archives / f"{name}.fmu").is_file() for name in UNITS):
+        parser.error(f"--archives: {given.archives} must hold {', '.join(UNITS)}; python -m fmu build makes them")
     anchor = {"stiffness": given.stiffness, "yield_force": given.yield_force} if given.stiffness else None
     rows = run_coupled(
         given.archives, step=given.step, end=given.end, spacing=given.spacing, scheme=given.scheme, anchor=anchor

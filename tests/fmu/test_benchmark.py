@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typer.testing import CliRunner
 
-from fmu.__main__ import BAD_INPUT, app
+from analytic.command_line import BAD_INPUT
+from fmu.__main__ import app
 
 
 def test_every_unit_has_its_line() -> None:

@@ -153,3 +153,31 @@ def test_ten_line_script_runs(folder: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "1.36" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--step", "-1"], "--step: -1 is not allowed; it must be a finite number greater than 0."),
+        (["--step", "nan"], "--step: nan is not allowed; it must be a finite number greater than 0."),
+        (["--end", "soon"], "--end: soon is not allowed; it must be a finite number greater than 0."),
+        (["--step", "7"], "--step: 7 is not allowed; it must be at most --end, 6."),
+        (["--spacing", "-0.1"], "--spacing: -0.1 is not allowed; it must be a finite number at least 0."),
+        (["--archives", "nowhere"], "--archives: nowhere must hold DebrisFlow, BarrierSliding, GroundAnchor; "),
+    ],
+)
+def test_script_refuses_in_one_sentence(
+    arguments: list[str],
+    sentence: str,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["coupled.py", "--archives", str(folder), *arguments])
+    with pytest.raises(SystemExit) as stop:
+        coupled.main()
+    assert stop.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(sentence)
+    assert said.err.count("\n") == 1

@@ -13,8 +13,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from fmu import archive
+from fmu import archive, c_unit
+from fmu.__main__ import app
 from fmu.cross_check import CrossCheck, cross_check
 from warp_mpm import Scenario
 
@@ -148,6 +150,11 @@ def test_command_compares_a_scenario(tmp_path: Path) -> None:
     assert content["at_least"] == []
     assert content["notes"] == []
     assert (tmp_path / "set_v.png").stat().st_size > 10_000
+    table = (tmp_path / "set_v.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines() if line.startswith("|")]
+    assert rows[0][:2] == ["", "peak force [kN/m]"]
+    assert [row[0] for row in rows[2:]] == ["simulation", *(f"unit, {unit['name']}" for unit in content["units"])]
+    assert float(rows[2][1]) == pytest.approx(content["simulation"]["peak_force"] / 1e3, rel=1e-3)
 
 
 def test_command_compares_nothing_with_what_was_not_over(tmp_path: Path) -> None:
@@ -196,12 +203,19 @@ def test_command_tells_a_broken_archive(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["build", "--only", "Barrier"], "--only is Barrier, it must be one of BarrierSliding, GroundAnchor"),
-        (["build", "--platform", "amiga", "--only", "BarrierSlidingC"], "platform is amiga, it must be one of linux64"),
+        (
+            ["build", "--only", "Barrier"],
+            "--only = Barrier is not allowed; it must be one of BarrierSliding, GroundAnchor",
+        ),
+        (
+            ["build", "--platform", "amiga", "--only", "BarrierSlidingC"],
+            "--platform = amiga is not allowed; it must be one of linux64",
+        ),
+        (["build", "--platform", "amiga"], "--platform = amiga is not allowed"),
         (["build", "--scenario", "nowhere.json"], "nowhere.json"),
         (["check", "nowhere.fmu"], "nowhere.fmu is not there."),
         (["check", "pyproject.toml"], "it must be .fmu or .json"),
-        (["check", "scenarios/case_5.json", "--spacing", "-1"], "numerics.spacing_m"),
+        (["check", "scenarios/case_5.json", "--spacing", "-1"], "--spacing = -1.0 is not allowed; it must be"),
         (["check", "scenarios/case_1.json", "--device", "cuda:77"], "device = 'cuda:77'"),
     ],
 )
@@ -215,3 +229,27 @@ def test_bad_input_is_one_sentence(arguments: list[str], says: str, tmp_path: Pa
     sentences = [line for line in done.stderr.strip().splitlines() if not line.startswith("Warp ")]
     assert len(sentences) == 1
     assert not out.exists() or not list(out.iterdir())
+
+
+@pytest.mark.parametrize("cross_compiler", [True, False])
+def test_command_says_for_which_platforms_the_c_unit_is(
+    cross_compiler: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not cross_compiler:
+        monkeypatch.setattr(c_unit, "has_cross_compiler", lambda: False)
+    done = CliRunner().invoke(app, ["build", "--only", "BarrierSlidingC", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    if cross_compiler:
+        assert done.stdout.endswith(" kB  for linux64, win64, darwin64\n")
+        assert done.stderr == ""
+    else:
+        assert done.stdout.endswith(f" kB  for {c_unit.host_platform()}\n")
+        assert "for other platforms needs the package ziglang: pip install '.[fmu]'" in done.stderr
+
+
+def test_command_leaves_nothing_where_a_compiler_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(c_unit, "has_cross_compiler", lambda: False)
+    done = CliRunner().invoke(app, ["build", "--platform", "win64", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert done.stderr == "Building for x86_64-windows-gnu needs the package ziglang: pip install '.[fmu]'.\n"
+    assert not list(tmp_path.iterdir())

@@ -99,10 +99,10 @@ def assert_stable(data):
 def no_matter_of_stability(scenario):
     """Figures that depend on how many cells and points a scene is given, or how much of it flies, and not on whether
     it is stable: a pressure's noise on three cells, points that the coarse face lets in, material in flight or pressed
-    beyond its voids in a corner, and the residual of a barrier of hardly any mass in single precision. Where a skeleton
-    is pressed to near its grains, stress is as steep as 1 / J and single points overshoot the shock, 2.7 times so far.
+    beyond its voids in a corner. Where a skeleton is pressed to near its grains, stress is as steep as 1 / J and single
+    points overshoot the shock, 2.7 times so far.
     """
-    names = {"pressure_noise", "stress_ratio", "unconverged_share"}
+    names = {"pressure_noise", "stress_ratio"}
     names |= {"pushed_share", "gaps_bounded_share", "voids_closed_share"}
     if scenario.numerics.transfer == "flip":
         # Points keep velocities that the grid does not see and that move nothing: scenarios/hard/flip_soft.json.

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 
 import warp_mpm.simulation
 from warp_mpm.cli import BAD_INPUT, DIVERGED, INTERRUPTED, app
+from warp_mpm.commands.check import described
 from warp_mpm.recording import run_folder
 from warp_mpm.results import Results
+from warp_mpm.scenario import Scenario
 
 SCENES = Path(__file__).parents[2] / "scenarios"
 SET_IIB = str(SCENES / "set_iib.json")
@@ -82,10 +84,16 @@ def test_an_existing_run_needs_force(command):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("--spacing", "-1"), "numerics.spacing_m = -1.0 is not allowed"),
-        (("--spacing", "nan"), "numerics.spacing_m = NaN is not allowed"),
-        (("--until", "0"), "output.end_time_s = 0.0 is not allowed"),
-        (("--until", "soon"), "Invalid value for '--until'"),
+        (("--spacing", "-1"), "--spacing = -1.0 is not allowed"),
+        (("--spacing", "nan"), "--spacing = NaN is not allowed"),
+        (("--until", "0"), "--until = 0.0 is not allowed"),
+        (
+            ("--until", "soon"),
+            "--until = soon is not allowed; it must be a finite number greater than 0 and at most 1e+06.",
+        ),
+        (("--spacing", "40"), "--spacing = 40 leaves less than one material point for the flow of 45 m³/m; it must"),
+        (("--jobs", "0"), "--jobs = 0 is not allowed; it must be a whole number at least 1 and at most 1024.\n"),
+        (("--spacing",), "Option '--spacing' requires an argument.\n"),
         (("--velocity", "3"), "No such option: --velocity"),
     ],
 )
@@ -109,7 +117,7 @@ def test_unknown_device(command, monkeypatch):
     monkeypatch.setattr(warp_mpm.simulation, "Simulation", refuse)
     result = run(command, "--device", "cuda:9")
     assert result.exit_code == BAD_INPUT
-    assert result.stderr == "device = 'cuda:9' does not exist here; it must be one of cpu\n"
+    assert result.stderr == "--device = 'cuda:9' does not exist here; it must be one of cpu\n"
     assert not Path("runs").exists()
 
 
@@ -172,7 +180,9 @@ def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
     assert record["status"] == "finished"
     assert record["resumed"][0]["simulated_time"] == pytest.approx(0.52)
     assert {item.name for item in Path("here").iterdir()} == set(run_folder.OWN_FILES)
-    assert command("run", "--resume", "here").exit_code == 0  # nothing left to do
+    again = command("run", "--resume", "here")
+    assert again.exit_code == 0
+    assert again.stderr == "The run in here had finished before; nothing was left to simulate.\n"
 
 
 @pytest.mark.parametrize(
@@ -189,10 +199,48 @@ def test_nothing_to_go_on_with(command, arguments, sentence):
     assert sentence in result.stderr
 
 
+def test_report_of_a_run_without_its_end_says_how_to_go_on(command):
+    assert run(command, "--out", "here").exit_code == 0
+    (Path("here") / run_folder.SUMMARY).unlink()
+    result = command("report", "here")
+    assert result.exit_code == BAD_INPUT
+    assert result.stderr == (
+        "here/summary.json is missing: the run has not come to its end; to go on with it: "
+        "python -m warp_mpm run --resume here\n"
+    )
+
+
 def test_check_tells_what_a_scene_is(command):
     result = command("check", *sorted(SCENES.glob("*.json")))
     assert result.exit_code == 0
-    assert "set_v.json: two-phase flow of 48 m³/m, 4 m deep, 86,400 kg/m; Fr 1.60; barrier sliding" in result.stdout
+    lines = result.stdout.splitlines()
+    begin = lines.index(f"{SCENES / 'set_v.json'}: Set V: depth 4 m, 48 m3/m, sliding barrier")
+    assert lines[begin + 1 : begin + 3] == [
+        "  two-phase flow of 48 m³/m, 86,400 kg/m, 4 m deep, v = 10 m/s (Fr 1.60); slope 0°, ground friction 0",
+        "  barrier H = 6 m, β = 59.7°, 90,000 kg/m, sliding with tan δ_b = 0.29; ends at 6 s; "
+        "about 4,800 points on a 0.2 m grid, float64",
+    ]
+    told = {file.stem: described(Scenario.load(file))[1:] for file in SCENES.glob("case_*.json")}
+    assert told["case_1"] != told["case_3"]  # 60° and 80°
+    assert "β = 59.7°, fixed" in told["case_1_fixed"][1]
+    assert told["case_5"][1].startswith("barrier: wall without end, fixed")
+
+
+def test_check_tells_of_a_driven_barrier_and_of_a_slope(command):
+    hard = SCENES / "hard"
+    result = command("check", hard / "driven_shaken.json", hard / "slope_30.json", hard / "domain_wall.json")
+    assert "barrier H = 6 m, β = 59.7°, driven; ends at 3 s" in result.stdout
+    assert "slope 30°, ground friction 0.3" in result.stdout
+    assert "no barrier; ends at 4 s" in result.stdout
+
+
+def test_check_tells_of_a_slip(command):
+    scene = json.loads(Path(SET_IIB).read_text())
+    scene["flow"]["material"]["grain_density_kg_per_m3"] = 2.65
+    Path("slip.json").write_text(json.dumps(scene))
+    result = command("check", "slip.json")
+    assert result.exit_code == 0
+    assert "Note: flow.material.grain_density_kg_per_m3 = 2.65 is lighter than water" in result.stdout
 
 
 def test_check_goes_on_after_a_bad_file(command):
@@ -200,7 +248,7 @@ def test_check_goes_on_after_a_bad_file(command):
     result = command("check", "bad.json", SET_IIB)
     assert result.exit_code == BAD_INPUT
     assert result.stderr == "bad.json: flwo is not a field of a scenario; did you mean flow?\n"
-    assert "set_iib.json: two-phase" in result.stdout
+    assert "set_iib.json: Set IIb: 20 m/s, sliding barrier\n  two-phase flow of 45" in result.stdout
 
 
 def test_schema_is_json(command):

@@ -105,7 +105,7 @@ def test_command(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
     refused = runner.invoke(app, ["plan", file, "--spacing", "-1"])
     assert refused.exit_code == 2
-    assert "numerics.spacing_m = -1" in refused.output
+    assert "--spacing = -1" in refused.output
     nowhere = runner.invoke(app, ["plan", file, "--device", "cuda:7"])
     assert nowhere.exit_code == 2
     assert "cuda:7" in nowhere.output

@@ -158,7 +158,11 @@ def test_table_4(name):
         ("flow.shape.kind", "box", 'flow.shape.kind = "box" is not allowed'),
         ("flow.shape.squares", -1, "flow.shape.squares = -1 is not allowed; it must be a whole number at least 0"),
         ("flow.shape.distance_m", -1, "flow.shape.distance_m = -1 is not allowed"),
-        ("flow.velocity_m_per_s", [1], "flow.velocity_m_per_s[1] is missing"),
+        (
+            "flow.velocity_m_per_s",
+            [1],
+            "flow.velocity_m_per_s = [1] is not allowed; it must be a list of 2 numbers: uniform velocity [x, y]",
+        ),
         ("flow.material.dilatancy_angle_deg", 30, "dilatancy_angle_deg = 30 must not exceed friction_angle_deg = 20"),
         ("flow.material.intrinsic_permeability_m2", 1e-11, "exactly one of hydraulic_conductivity_m_per_s"),
         ("barrier.shape.face_angle_deg", 91, "must be a finite number greater than 0 and at most 90"),

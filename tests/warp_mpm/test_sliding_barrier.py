@@ -48,6 +48,14 @@ def test_momentum_of_the_barrier_is_what_flow_and_base_gave_it(load_scene, mass)
     assert np.abs(told["momentum_residual_x"]).max() < 1e-9 * 810_000.0
 
 
+def test_a_jump_of_the_flows_impulse_is_closed_in_on(load_scene):
+    """At 1.235 s a node is let go at the very velocity at which the barrier's balance turns."""
+    simulation = Simulation(load_scene("set_iib"))
+    for record in range(1, 249):
+        simulation.advance(0.005 * record)
+    assert simulation.record["barrier_unconverged"] == 0
+
+
 def test_a_light_barrier_goes_with_the_flow(load_scene):
     """A thousandth of the flow's mass on a smooth base does not hold it up. It takes the speed of the flow's fastest
     part, which on an inclined face is more the steeper that comes down: v_x - v_y cot(beta) <= |v| / sin(beta)."""

@@ -63,6 +63,26 @@ def test_an_impact_that_is_not_over_has_no_end():
     assert figures["impulse"] > 0
 
 
+@pytest.mark.parametrize("until", [1.5, 2.0, 3.0, 4.0, 5.0])
+def test_a_force_that_still_falls_has_no_end(until):
+    """A slow decay, as of a deposit that settles: cut anywhere, its tail looks like a residual force."""
+    time = np.arange(0, until + 1e-9, 0.005)
+    force = 4e5 * np.where(time < 0.8, np.clip((time - 0.5) / 0.3, 0, 1), np.exp(-(time - 0.8) / 1.8))
+    assert impact_figures(time, force)["impact_end_time"] is None
+
+
+def test_the_end_does_not_depend_on_how_long_the_run_is():
+    ends = []
+    for until in (8.0, 10.0, 14.0):
+        time = np.arange(0, until + 1e-9, 0.005)
+        force = 4e5 * np.where(time < 0.8, np.clip((time - 0.5) / 0.3, 0, 1), np.exp(-(time - 0.8) / 1.8))
+        ends.append(impact_figures(time, force)["impact_end_time"])
+    # A tenth is left after 1.8 ln 10 s; a residual of up to 5 % counted off it brings that forward by up to 0.7 s.
+    assert ends[-1] == pytest.approx(0.8 + 1.8 * np.log(10), abs=0.05)
+    assert ends == sorted(ends)
+    assert ends[-1] - ends[0] < 0.7
+
+
 def test_no_impact():
     time = np.linspace(0, 1, 11)
     assert impact_figures(time, np.zeros(11))["peak_force"] == 0.0

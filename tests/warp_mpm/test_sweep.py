@@ -88,6 +88,12 @@ def test_distributions_have_their_moments(load, distribution, mean, deviation):
         (sweep_of("list", {SPEED: {"values": [1]}, MASS: {"values": [1, 2]}}), "as many values of each field"),
         (sweep_of("grid", {SPEED: {"values": [1], "uniform": [1, 2]}}), "needs exactly one of values, range"),
         (sweep_of("grid", {}), "vary"),
+        (
+            sweep_of("grid", {SPEED: {"range": [0.3, 0.6]}}),
+            r"range = \[0.3, 0.6\] is not allowed; it must be a list of 3 numbers: first, last and number of evenly",
+        ),
+        (sweep_of("grid", {SPEED: {"range": [1, 2, 3, 4]}}), r"list of 3 numbers: first, last and number of evenly"),
+        (sweep_of("grid", {SPEED: {"range": [1, "x", 3]}}), r'range\[1\] = "x" is not allowed; it must be a finite'),
     ],
 )
 def test_impossible_sweeps(load, content, words):

@@ -83,8 +83,9 @@ class Offer:
         """In words."""
         parts = ", ".join(f"{QUANTITIES[name].label} {error:.1%}" for name, error in self.errors.items())
         return (
-            f"Chosen: spacing {self.spacing:.4g} m ({self.source}). Expected: {self.time:.3g} s on a free core, errors "
-            f"of at most {self.error:.1%} ({parts})."
+            f"Chosen: spacing {self.spacing:.4g} m ({self.source}). Expected, on a free core: "
+            f"{self.time - OVERHEAD:.2g} s for the steps and their records and about {OVERHEAD:g} s to start and to "
+            f"finish; errors of at most {self.error:.1%} ({parts})."
         )
 
     def settled(self, run: Path, cpu_time: float) -> str:
@@ -101,8 +102,9 @@ class Offer:
             if figures.get(name) is not None and value
         )
         return (
-            f"Got: {cpu_time:.3g} s of the processor, {cpu_time / self.time:.2g} times what was expected "
-            f"({figures['wall_time']:.3g} s by the clock); away from the values expected on the finest grids: {parts}."
+            f"Got: {figures['wall_time']:.2g} s for the steps and their records, {cpu_time:.3g} s of the processor in "
+            f"all, {cpu_time / self.time:.2g} times what was expected; away from the values expected on the finest "
+            f"grids: {parts}."
         )
 
 
@@ -216,9 +218,13 @@ def choose(
         if not kept:
             least = min(law.error(s) for s in sold)
             best = max(s for s in sold if law.error(s) <= least * (1.0 + 1e-9))
+            errors = law.errors(best)
+            scattered = QUANTITIES[max(errors, key=lambda name: errors[name])].label
             raise PurchaseError(
                 f"--accuracy {_text(accuracy)} cannot be promised for this scene: the best on offer is "
-                f"{_text(least, up=True)} at a spacing of {best:.4g} m, in {law.time(best):.3g} s."
+                f"{_text(least, up=True)} at a spacing of {best:.4g} m, in {law.time(best):.3g} s. It is the "
+                f"{scattered} that varies by so much from one spacing to the next, and finer ones are not known to do "
+                f"better; ask for --accuracy {_text(least, up=True)}, or choose by --spacing or --budget."
             )
         spacing = max(kept)
     else:

@@ -121,7 +121,10 @@ class Study:
 
     @property
     def recommended_spacing(self) -> float | None:
-        """Coarsest spacing of the scenario's own settings that keeps `DEFAULT_TARGET`, as all finer do [m]; or None."""
+        """Coarsest spacing of the scenario's own settings that keeps `DEFAULT_TARGET`, as all finer do [m]; or None, as
+        where the reference is not known that well."""
+        if self.doubt("overall") > DEFAULT_TARGET:
+            return None
         ladder = [row for row in self.rows if row.setting.knob == DEFAULT]
         kept = [row.setting.spacing for row in ladder if self._lasting(row, "overall") <= DEFAULT_TARGET]
         return max(kept, default=None)
@@ -231,8 +234,12 @@ def sentences(study: Study) -> list[str]:
                 cheapest[row.setting.name] = f"{target:.0%} costs {row.time:.2g} s ({row.setting.name})"
         prices = list(cheapest.values())
         best = min((error_of(row, name) for row in study.rows), default=math.inf)
+        doubt = study.doubt(name)
+        if doubt > TARGETS[0]:
+            said.append(f"{label}: the finest runs tell it to {doubt:.1%} only, so no setting is known to keep less.")
+            continue
         answer = "; ".join(prices) if prices else f"no run keeps {TARGETS[0]:.0%}, the best is off by {best:.1%}"
-        said.append(f"{label}: {answer}; the reference is known to {study.doubt(name):.1%}.")
+        said.append(f"{label}: {answer}; the reference is known to {doubt:.1%}.")
     for knob in study.knobs:
         said.append(
             f"{knob.name} {level_text(knob.level)}: {knob.verdict}: {knob.time_ratio:.2g} times the time, error "
@@ -241,7 +248,7 @@ def sentences(study: Study) -> list[str]:
     said.append(_place_of_default(study))
     spacing = study.recommended_spacing
     said.append(
-        f"No spacing of this study keeps {DEFAULT_TARGET:.0%} on the key figures."
+        f"No spacing of this study is known to keep {DEFAULT_TARGET:.0%} on the key figures."
         if spacing is None
         else f"Recommended spacing: {spacing:g} m, the coarsest that keeps {DEFAULT_TARGET:.0%} on the key figures, as "
         "all finer ones do."

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import complain, refusals
+from warp_mpm.commands.refusals import complain, refusals, with_options
 
 if TYPE_CHECKING:
     from warp_mpm.accuracy.purchase import Offer
@@ -78,8 +78,7 @@ def accuracy(
         from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, ladder, plan
         from warp_mpm.scenario import Scenario
 
-        changes = {} if until is None else {"output.end_time_s": until}
-        scenes = [Scenario.load(path).replaced(changes) for path in scenarios]
+        scenes = [with_options(Scenario.load(path), spacing=None, until=until) for path in scenarios]
         name = "check" if check else scenarios[0].stem if len(scenes) == 1 else "ladders"
         folder = out if out is not None else Path("runs/accuracy") / name
         if page is not None:

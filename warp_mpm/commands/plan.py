@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals
+from warp_mpm.commands.refusals import refusals, with_options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,13 +39,12 @@ def plan(
     from rich.console import Console
 
     with refusals():
+        from warp_mpm.caveats import scene_caveats
         from warp_mpm.performance.plan import make_plan
         from warp_mpm.performance.plan import what_if as switched
         from warp_mpm.scenario import Scenario
 
-        changes = {"numerics.spacing_m": spacing, "output.end_time_s": until}
-        scenario = Scenario.load(scenario_file)
-        scenario = scenario.replaced({path: value for path, value in changes.items() if value is not None})
+        scenario = with_options(Scenario.load(scenario_file), spacing=spacing, until=until)
         console = Console(highlight=False, markup=False)
         if not console.is_terminal:
             console.width = 130
@@ -63,6 +62,8 @@ def plan(
         typer.echo(json.dumps(told | {"what_if": [asdict(switch) for switch in switches]}, indent=2))
         return
     console.print(scenario.title, style="bold")
+    for sentence in scene_caveats(scenario):
+        console.print(f"Note: {sentence}", soft_wrap=True)
     _print_effects(console, card)
     _print_kernels(console, card)
     _print_size(console, card)

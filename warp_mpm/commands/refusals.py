@@ -1,34 +1,48 @@
-"""One sentence and an exit code for what cannot be done."""
+"""One sentence for what cannot be done, with the scenario's own ranges for the options that change it."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
-import typer
+from analytic.command_line import CommandLine
+from analytic.command_line import complain as complain
+from analytic.command_line import refusals as refusals
 
-BAD_INPUT = 2
-"""Exit code of an input that cannot be used."""
+if TYPE_CHECKING:
+    from warp_mpm.scenario import Scenario
+
+FIELDS = {"spacing": "numerics.spacing_m", "until": "output.end_time_s"}
+"""Options that stand in place of a field of the scenario."""
 
 
-@contextmanager
-def refusals() -> Iterator[None]:
-    """Turn a ValueError, which all bad inputs raise, and what the disk refuses into a sentence and exit code 2."""
+class ScenarioCommandLine(CommandLine):
+    """A command line with options that stand in place of fields of a scenario and have their ranges."""
+
+    def allowed(self, parameter: Any) -> str:
+        if parameter.name not in FIELDS:
+            return super().allowed(parameter)
+        from warp_mpm.scenario import Scenario
+        from warp_mpm.scenario_errors import allowed
+
+        return allowed(FIELDS[parameter.name], Scenario)
+
+
+def with_options(scenario: Scenario, *, spacing: float | None, until: float | None) -> Scenario:
+    """The scenario with what --spacing and --until say in place of its own.
+
+    Raises:
+        ScenarioError: a value is not allowed; the sentence names the option.
+    """
+    from warp_mpm.scenario_errors import ScenarioError
+
+    given = {name: value for name, value in (("spacing", spacing), ("until", until)) if value is not None}
     try:
-        yield
-    except ValueError as error:
-        complain(str(error))
-        raise typer.Exit(BAD_INPUT) from None
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        complain(f"{place}{error.strerror or error}".rstrip(".") + ".")
-        raise typer.Exit(BAD_INPUT) from None
-
-
-def complain(sentence: str) -> None:
-    """Print a sentence to standard error, red on a terminal."""
-    typer.secho(sentence, err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        return scenario.replaced({FIELDS[name]: value for name, value in given.items()})
+    except ScenarioError as error:
+        text = "\n".join(error.problems)
+        for name in given:
+            text = text.replace(FIELDS[name], f"--{name}")
+        raise ScenarioError(text.split("\n")) from None
 
 
 def times_of(text: str) -> tuple[float, ...]:

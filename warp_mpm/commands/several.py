@@ -114,12 +114,16 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from warp_mpm.terminal import AT_LEAST, sliding_distance
+
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 160  # a file has no edge to fit to
     table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("run", "status", "peak F₂ₓ [kN/m]", "impulse [kN s/m]", "Δx [m]", "mechanism", "wall time [s]"):
-        table.add_column(heading, justify="left" if heading in ("run", "status", "mechanism") else "right")
+    words = ("run", "status", "mechanism")
+    figures = ("peak F₂ₓ, 0.05 s mean [kN/m]", "impulse [kN s/m]", "Δx [m]")
+    for heading in (*words[:2], *figures, words[2], "wall time [s]"):
+        table.add_column(heading, justify="left" if heading in words else "right")
     for folder, summary in summaries.items():
 
         def cell(name: str, factor: float = 1.0, summary: dict[str, Any] = summary) -> str:
@@ -130,8 +134,10 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
             str(summary.get("status")),
             cell("peak_force_filtered", 1e-3),
             cell("impulse", 1e-3),
-            cell("barrier_displacement_final"),
+            sliding_distance(summary),
             summary.get("mechanism") or "–",
             cell("wall_time"),
         )
     console.print(table)
+    if any(summary.get("barrier_at_rest") is False for summary in summaries.values()):
+        console.print(AT_LEAST)

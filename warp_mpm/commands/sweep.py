@@ -14,7 +14,7 @@ CASE_FAILED = 4
 """Exit code when the sweep went through and some of its cases failed."""
 
 SHOWN = {
-    "peak_force": ("peak F₂ₓ [kN/m]", 1e-3),
+    "peak_force_filtered": ("peak F₂ₓ, 0.05 s mean [kN/m]", 1e-3),
     "impulse": ("impulse [kN s/m]", 1e-3),
     "barrier_velocity_max": ("v₂,max [m/s]", 1.0),
     "barrier_displacement_final": ("Δx [m]", 1.0),
@@ -91,6 +91,8 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from warp_mpm.terminal import AT_LEAST, sliding_distance
+
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 200  # a file has no edge to fit to
@@ -100,8 +102,12 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
         table.add_column(heading, justify="right")
     for row in rows:
         figures = ["–" if row.get(name) is None else f"{row[name] * SHOWN[name][1]:.4g}" for name in shown]
+        if "barrier_displacement_final" in shown:
+            figures[shown.index("barrier_displacement_final")] = sliding_distance(row)
         table.add_row(str(row["case"]), *(_short(row[path]) for path in varied), row["status"], *figures)
     console.print(table)
+    if any(row.get("barrier_at_rest") is False for row in rows):
+        console.print(AT_LEAST)
 
 
 def _leaf(path: str) -> str:

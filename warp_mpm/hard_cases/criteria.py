@@ -127,9 +127,9 @@ CRITERIA = (
     Criterion(
         "unconverged_share",
         1e-3,
-        0.05,
-        "share of steps in which the barrier's velocity was not found to 1e-10 of its impulses, which single precision "
-        "does not resolve",
+        1e-3,
+        "share of steps in which the barrier's velocity was found neither to 1e-10 of its impulses nor to 1e-10 of "
+        "itself (1e-4 in single precision)",
     ),
     Criterion(
         "halving_displacement",

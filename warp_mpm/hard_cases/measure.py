@@ -152,7 +152,7 @@ def _energy_error(columns: dict[str, Array], undecided: float) -> float:
     """Greatest energy beyond what was there or put in, over that."""
     parts = [columns[f"flow_{kind}_energy"] for kind in ("kinetic", "gravitational", "elastic")]
     work = columns.get("barrier_work", np.zeros(1))
-    total = sum(parts) + columns["left_energy"] + work
+    total = sum(parts) + columns["left_energy"] + work - columns.get("seepage_work", 0.0)
     # A driven barrier puts energy in by its work, and gravity on a slope by the fall.
     gained = max(float(np.max(-work)), 0.0) + max(float(np.max(parts[1][0] - parts[1])), 0.0)
     put_in = sum(abs(float(part[0])) for part in parts) + undecided + gained

@@ -94,7 +94,9 @@ LEDGER_PRESSURE_MEAN = 9
 """Greatest pressure upstream of the crest's end, less its noise about the mean over a cell."""
 LEDGER_NOT_FINITE = 10
 """Material points of which some quantity is not a finite number."""
-LEDGER_SIZE = 11
+# Rate at which gravity works on liquid that moves relative to the skeleton.
+LEDGER_SEEPAGE = 11
+LEDGER_SIZE = 12
 
 # What left the domain, a float64 array.
 LEFT_SOLID_MASS = 0

@@ -16,7 +16,11 @@ from .layout import (
     TIME_STEP,
 )
 
-MAX_ITERATIONS = 30
+MAX_ITERATIONS = 60
+
+SECANTS = 12
+"""Iterations of regula falsi, after which the bracket is halved: in one step of thousands the flow's impulse jumps at
+some velocity of the barrier, at which a node is let go; only halving closes in on that."""
 
 
 def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module: str) -> SimpleNamespace:
@@ -27,8 +31,9 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
 
         m_2 (v - v_2) = J_x(v) + F_ext dt - sign(v) tan(delta_b) max(0, W dt - J_y(v)),
 
-    and v = 0 where friction can hold it. The unknown is bracketed and found by regula falsi (Illinois): the residual is
-    piecewise linear and increasing.
+    and v = 0 where friction can hold it. The unknown is bracketed and found by regula falsi (Illinois), for the
+    residual is mostly piecewise linear and decreasing. Where it jumps from one sign to the other, v is where it jumps,
+    and friction takes what lies between.
     """
     F = types.scalar
     V2 = types.V2
@@ -37,6 +42,8 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     respond = contact.respond
     impulse = contact.impulse
     CARRIED = types.effects.barrier_friction and types.effects.liquid
+    # Relative width of a bracket that is closed: impulses are rounded to the scalar's precision.
+    CLOSED = 1.0e-12 if types.effects.precision == "float64" else 1.0e-6
 
     @wp.func
     def flow_impulse(
@@ -98,8 +105,12 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
             residual = low_residual
             v = high
             side = wp.int32(0)
-            while iterations < wp.static(MAX_ITERATIONS) and wp.abs(residual) > tolerance:
-                if bracketed:
+            width = high
+            closed = wp.float64(CLOSED) * high
+            while iterations < wp.static(MAX_ITERATIONS) and wp.abs(residual) > tolerance and width > closed:
+                if bracketed and iterations >= wp.static(SECANTS):
+                    v = wp.float64(0.5) * (low + high)
+                elif bracketed:
                     v = (low * high_residual - high * low_residual) / (high_residual - low_residual)
                 else:
                     v = high
@@ -121,10 +132,13 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
                         low_residual *= wp.float64(0.5)
                     bracketed = wp.bool(True)
                     side = wp.int32(-1)
+                if bracketed:
+                    width = high - low
+                    closed = wp.float64(CLOSED) * high
                 iterations += 1
             new = sign * v
             wp.atomic_add(counters, wp.static(BARRIER_ITERATIONS), iterations)
-            if wp.abs(residual) > tolerance * wp.float64(1.0e3):
+            if wp.abs(residual) > tolerance * wp.float64(1.0e3) and width > wp.float64(100.0) * closed:
                 wp.atomic_add(counters, wp.static(BARRIER_UNCONVERGED), 1)
             # The momentum balance is closed exactly with the friction that is recorded.
             friction = momentum + j[0] - mass * new

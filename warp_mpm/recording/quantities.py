@@ -47,6 +47,12 @@ TIME_SERIES = _registry(
     ("flow_kinetic_energy", "J/m", "kinetic energy of both phases of the flow, E_k1"),
     ("flow_gravitational_energy", "J/m", "potential energy of the flow, zero at the origin"),
     ("flow_elastic_energy", "J/m", "elastic energy of the skeleton and the liquid"),
+    (
+        "seepage_work",
+        "J/m",
+        "work of gravity since t = 0 on liquid that moves through the skeleton, whose place in the potential energy is "
+        "the skeleton's",
+    ),
     ("barrier_kinetic_energy", "J/m", "kinetic energy of the barrier, E_k2"),
     ("barrier_work", "J/m", "work done by the flow on the barrier since t = 0"),
     ("base_friction_work", "J/m", "work that friction at the barrier's base has taken since t = 0"),

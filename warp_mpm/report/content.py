@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analytic.arrays import trajectory
 from analytic.calibration import RULES, Calibration, CalibrationError, calibrate, misfit
 from analytic.scene import SceneError, scene_of
+from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.effect_rules import effect_rules
 from warp_mpm.results import Results
 from warp_mpm.scenario import Trapezoid, Wall
@@ -89,7 +90,7 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "effects": {rule.effect: f"{_text(rule.value)}: {rule.reason}" for rule in effect_rules(scenario)},
         "settings": {path: _text(value) for path, value in flattened(scenario.resolved())},
         "versions": _versions(record),
-        "warnings": warnings(results) + no_fit,
+        "warnings": [*_unfinished(results), *scene_caveats(scenario), *run_caveats(record, results.summary), *no_fit],
         "notes": list(scenario.notes),
         "ground": scenario.ground is not None,
         "barrier": _outline(results),
@@ -135,34 +136,22 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     row("energy of the flow at the end", last, "kJ/m", 1e-3)
     row("work done on the barrier", at("barrier_work", -1), "kJ/m", 1e-3)
     row("  of it taken by base friction", at("base_friction_work", -1), "kJ/m", 1e-3)
+    row("work of gravity on seepage", at("seepage_work", -1), "kJ/m", 1e-3)
     row("energy that left the domain", at("left_energy", -1), "kJ/m", 1e-3)
     if first is not None and last is not None:
         spent = first - last - (at("barrier_work", -1) or 0.0) - (at("left_energy", -1) or 0.0)
+        spent += at("seepage_work", -1) or 0.0
         row("dissipated in the flow", spent, "kJ/m", 1e-3)
     row("energy created, relative", summary.get("energy_error"), "")
     return rows
 
 
-def warnings(results: Results) -> list[str]:
-    """Sentences on what a reader must know before he trusts the figures."""
-    record, summary, found = results.record, results.summary, []
-    if record.get("status") != "finished":
-        reason = f": {record['problem']}" if record.get("problem") else ""
-        found.append(f"The run is {record.get('status')} at t = {summary.get('end_time', 0.0):.3f} s{reason}")
-    if record.get("git_changed"):
-        found.append("The program's source differed from its commit when this was run.")
-    if record.get("points_left"):
-        left = summary.get("left_volume") or 0.0
-        found.append(f"{record['points_left']:,} material points ({left:.3g} m³/m) left the domain.")
-    if record.get("barrier_unconverged"):
-        found.append(f"The barrier's motion was not solved to its tolerance in {record['barrier_unconverged']} steps.")
-    for name, bound in (("mass_error", 1e-9), ("momentum_error", 1e-6), ("energy_error", 0.02)):
-        value = summary.get(name)
-        if value is not None and value > bound:
-            found.append(f"{name} = {value:.2g} is above {bound:g}.")
-    if summary.get("peak_force") and summary.get("impact_end_time") is None:
-        found.append("The impact is not over at the end of the run, so its duration and impulse are not known.")
-    return found
+def _unfinished(results: Results) -> list[str]:
+    record = results.record
+    if record.get("status") == "finished":
+        return []
+    reason = f": {record['problem']}" if record.get("problem") else ""
+    return [f"The run is {record.get('status')} at t = {results.summary.get('end_time', 0.0):.3f} s{reason}"]
 
 
 def _closed_forms(results: Results) -> tuple[list[Calibration], list[str]]:

@@ -56,7 +56,7 @@ def _misplaced_flow(scenario: Scenario) -> list[str]:
         overlap = geometry.area(inside) if len(inside) else 0.0
         if overlap > hair * scenario.flow.depth:
             problems.append(
-                f"flow.shape lies inside the barrier by {overlap:.3g} m² of area; it must lie outside "
+                f"flow.shape lies inside the barrier by {overlap:.3g} m³/m; it must lie outside "
                 "(the barrier's toe is at x = 0 and its body at x >= 0)"
             )
     return problems
@@ -106,7 +106,7 @@ def _excessive_size(scenario: Scenario) -> list[str]:
     if points < 1.0:
         problems.append(
             f"numerics.spacing_m = {scenario.numerics.spacing_m:g} leaves less than one material point for the flow "
-            f"of {scenario.flow.volume:.3g} m²; it must be smaller"
+            f"of {scenario.flow.volume:.3g} m³/m; it must be smaller"
         )
     domain = scenario.domain
     x_low, x_high, y_low, y_high = _extent(scenario)

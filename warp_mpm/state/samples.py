@@ -16,6 +16,10 @@ class Totals:
 
     clock: list[float]
     reactions: list[float]
+    seepage_power: float = 0.0
+    """Rate at which gravity works on liquid that moves relative to the skeleton, at this time [W/m]."""
+    seepage_work: float = 0.0
+    """That work since t = 0, by the trapezoidal rule over the samples [J/m]."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,8 @@ def sample(
         # points meet the ground at water-hammer pressure.
         values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MEAN]
     if effects.two_phase:
+        # Liquid is carried at the skeleton's points, so that its own fall through the voids is in no potential energy.
+        values["seepage_work"] = last.seepage_work + 0.5 * elapsed * (last.seepage_power + sums[at.LEDGER_SEEPAGE])
         values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
     values |= {
         "momentum_x": momentum_x,
