@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +102,7 @@ def outcomes(
     vertical_load_ratio: ArrayLike = 0.0,
     variant: str = VARIANTS[0],
     gravity: float = STANDARD_GRAVITY,
+    slope: float = 0.0,
 ) -> Outcomes:
     """Outcome of each of many impacts; the inputs broadcast against each other.
 
@@ -128,7 +130,15 @@ def outcomes(
         raise ValueError("vertical_load_ratio times base_friction must be below 1 everywhere.")
 
     fixed = np.isinf(m2)
-    deceleration = gravity * tan
+    angle = math.radians(slope)
+    held = (tan > abs(math.tan(angle))) | fixed
+    if slope != 0 and not np.all(held):
+        worst = np.min(np.broadcast_to(tan, held.shape)[~held])
+        raise ValueError(
+            f"base_friction is {worst:.4g}, on a slope of {slope:g} degrees it must be above "
+            f"{abs(math.tan(angle)):.4g} everywhere, else the barrier slides by its own weight."
+        )
+    deceleration = gravity * (tan * math.cos(angle) - math.sin(angle))
     T2 = 8 * change * length / (3 * v)
     J = v * m1 / (1 + m1 / m2)
     # The force less the friction that it brings along moves m2 as the whole force moves a mass larger by 1 / share.

@@ -36,6 +36,9 @@ START_SHARE = 0.01
 END_SHARE = 0.1
 """Share of the peak's height over the residual force at which the impact is over."""
 
+SETTLED_SHARE = 0.05
+"""Share of the peak force below which a residual force has settled, however it changes."""
+
 RESIDUAL_SHARE = 0.1
 """Last share of the record over which the residual force is taken."""
 
@@ -58,6 +61,11 @@ class Measured:
     """Its time [s]."""
     end_time: float
     """Time after which the filtered force stays within 10 % of the peak above the residual force [s]."""
+    over: bool
+    """Whether the impact ends within the record, by the rule of the simulator's summary: ``end_time`` lies before its
+    last tenth, and by then the force has settled. It has not where the residual force is above 5 % of the peak and, at
+    the rate of its last change, would change by more than 10 % of the peak in as long as the impact has lasted. Then a
+    longer record shows a later end, and ``duration`` and ``impulse`` are bounds from below."""
     impulse: float
     """Integral of the force from arrival to end [N s/m]."""
     residual_force: float
@@ -74,6 +82,19 @@ class Measured:
     def duration(self) -> float:
         """T2 [s]."""
         return self.end_time - self.arrival_time
+
+    @property
+    def warning(self) -> str | None:
+        """One sentence where the impact is not over at the end of the record, else ``None``."""
+        if self.over:
+            return None
+        share = self.residual_force / self.peak_force
+        return f"the impact is not over at the end of the record, the force is {share:.0%} of its peak and changing"
+
+    @property
+    def at_least(self) -> tuple[str, ...]:
+        """Names of the figures that the record only bounds from below."""
+        return () if self.over else ("duration", "impulse")
 
     @property
     def filter_rule(self) -> str:
@@ -109,17 +130,25 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
         raise CalibrationError("The force still rises when the record ends, there is no peak to calibrate on.")
     first = int(np.argmax(force > START_SHARE * force.max()))
     arrival = float(time[max(first - 1, 0)])
-    residual = max(float(filtered[time >= time[-1] - RESIDUAL_SHARE * (time[-1] - time[0])].mean()), 0.0)
+    impulse = cumulative_impulse(time, force)
+    tenth = RESIDUAL_SHARE * float(time[-1] - time[0])
+    tail = float(time[-1]) - tenth
+    before, at_tail = np.interp([tail - tenth, tail], time, impulse)
+    last = float(impulse[-1] - at_tail) / tenth
+    # A force that still falls has another residual the longer the record, and with it another end.
+    to_come = abs(last - float(at_tail - before) / tenth) / tenth * (float(time[-1]) - arrival)
+    settled = last <= SETTLED_SHARE * filtered[peak] or to_come <= END_SHARE * filtered[peak]
+    residual = max(last, 0.0)
     threshold = residual + END_SHARE * (filtered[peak] - residual)
     above = np.flatnonzero(filtered[peak:] >= threshold)
     end = peak + int(above[-1]) + 1
     end_time = float(time[min(end, len(time) - 1)])
-    impulse = cumulative_impulse(time, force)
     return Measured(
         arrival_time=arrival,
         peak_force=float(filtered[peak]),
         peak_time=float(time[peak]),
         end_time=end_time,
+        over=end_time <= tail and bool(settled),
         impulse=float(np.interp(end_time, time, impulse) - np.interp(arrival, time, impulse)),
         residual_force=residual,
         filter_window=filter_window,
@@ -260,7 +289,7 @@ def measured_vertical_load_ratio(
     ----------
     time [s], force [N/m]: as in ``measure``.
     base_normal_force: force with which the barrier presses on its base, mean over the interval [N/m].
-    weight: m2 g [N/m].
+    weight: with which the barrier alone presses on its base [N/m].
     """
     inside = (time > measured.arrival_time) & (time <= measured.end_time)
     widths = np.diff(time, prepend=time[0])[inside]
@@ -321,6 +350,8 @@ class KeyFigures:
     barrier_kinetic_energy_max: float | None
     barrier_velocity_max: float | None
     barrier_displacement_final: float | None
+    at_least: tuple[str, ...] = ()
+    """Names of the figures that a record only bounds from below, because it ends too early."""
 
 
 def key_figures(impact: Impact) -> KeyFigures:
@@ -344,6 +375,11 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> Key
         return float(series[name].max()) if name in series else None
 
     energy = series.get("flow_kinetic_energy")
+    at_least = list(measured.at_least)
+    if not at_rest(series):
+        at_least.append("barrier_displacement_final")
+        if series["barrier_velocity"][-1] == series["barrier_velocity"].max():
+            at_least += ["barrier_velocity_max", "barrier_kinetic_energy_max"]
     return KeyFigures(
         peak_force=measured.peak_force,
         rise_time=measured.rise_time,
@@ -357,4 +393,19 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> Key
         barrier_displacement_final=float(series["barrier_displacement"][-1])
         if "barrier_displacement" in series
         else None,
+        at_least=tuple(at_least),
     )
+
+
+def at_rest(series: Mapping[str, Array]) -> bool:
+    """Whether the barrier is at rest at the end of a record; true where its velocity is not recorded."""
+    return "barrier_velocity" not in series or float(series["barrier_velocity"][-1]) == 0.0
+
+
+def warnings(series: Mapping[str, Array], measured: Measured) -> list[str]:
+    """What is not over at the end of a record, in sentences without capital and stop."""
+    found = [] if measured.warning is None else [measured.warning]
+    if not at_rest(series):
+        speed = float(series["barrier_velocity"][-1])
+        found.append(f"the barrier still moves at {speed:.3g} m/s at the end of the record")
+    return found

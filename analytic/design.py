@@ -94,6 +94,7 @@ def displacement(scene: Scene, barrier_mass: ArrayLike, coefficients: Coefficien
         vertical_load_ratio=coefficients.vertical_load_ratio,
         variant=coefficients.variant,
         gravity=scene.gravity,
+        slope=scene.slope,
     ).barrier_displacement_final
 
 

@@ -19,7 +19,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from analytic.impact import Impact
+from analytic.impact import Impact, friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene
 
 CALIBRATED = "calibrated"
@@ -134,7 +134,7 @@ def _impulse(scene: Scene, peak_force: float, rise_time: float, kappa: float) ->
         return stopping
     friction = scene.base_friction or 0.0
     driven_mass = scene.barrier_mass / (1 - kappa * friction)
-    threshold = driven_mass * scene.gravity * friction
+    threshold = driven_mass * friction_deceleration(scene.gravity, friction, scene.slope)
     r = threshold / peak_force
     if r >= 1:
         return stopping  # the barrier does not move
@@ -167,4 +167,6 @@ def beyond_fit(scene: Scene) -> list[str]:
         symbol, low, high = FITTED_RANGES[name]
         if value is not None and not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             found.append(f"{symbol} = {value:.3g} is outside the fitted range {low:g} to {high:g}.")
+    if scene.slope != 0:
+        found.append(f"The slope of {scene.slope:g} degrees is outside the fit, whose ground is level.")
     return found

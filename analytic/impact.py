@@ -2,7 +2,8 @@
 
 The flow is a box of mass m1, length L and depth h that arrives with the velocity v1,0. It pushes the barrier with a
 force F(t) that rises linearly from nil to F_peak at T1 and falls linearly to nil at T2. A barrier that is not fixed
-slides on its base against the friction R = m2 g tan(delta_b). Three variants answer for its motion:
+slides on its base against the friction R = m2 g tan(delta_b), on a slope of the angle theta against what its weight
+leaves of it, R = m2 g (tan(delta_b) cos(theta) - sin(theta)). Three variants answer for its motion:
 
 ``stick_slip``
     The consistent one and the default. The barrier holds still until F exceeds R, slides, and stops when its velocity
@@ -94,7 +95,7 @@ class Impact:
     flow_height: h [m] > 0, depth of the flow.
     speed: v_1,0 [m/s] > 0, velocity of the flow on arrival.
     barrier_initial_velocity: v_2,0 [m/s], 0 <= v_2,0 < v_1,0; 0 for a fixed barrier.
-    base_friction: tan(delta_b) [-] >= 0; required unless the barrier is fixed.
+    base_friction: tan(delta_b) [-] >= 0; required unless the barrier is fixed. On a slope more than its tangent.
     geometry_change: lambda = s1max / L_1,0 [-], in (0, 1]. Give either this or ``s1max``.
     s1max: largest geometry change length of the flow [m], in (0, L_1,0].
     rise_ratio: tau = T1 / T2 [-], in (0, 1].
@@ -103,6 +104,8 @@ class Impact:
     variant: one of ``VARIANTS``.
     arrival_time: time at which the front reaches the barrier [s] >= 0; all times below count from the same zero.
     gravity: g [m/s^2] > 0.
+    slope: theta [degrees] in (-90, 90), by which the ground falls in the direction of the flow. It acts on the barrier;
+        the flow's own weight along the slope is not in the model.
 
     Raises
     ------
@@ -123,6 +126,7 @@ class Impact:
     variant: str = VARIANTS[0]
     arrival_time: float = 0.0
     gravity: float = STANDARD_GRAVITY
+    slope: float = 0.0
 
     geometry_change_length: float = field(init=False, repr=False, compare=False)
     """s1max [m], whichever way it was given."""
@@ -167,15 +171,18 @@ class Impact:
 
     @property
     def friction(self) -> float:
-        """R = m2 g tan(delta_b) [N/m], what the base resists by the barrier's weight; infinite where it is fixed."""
+        """R = m2 g (tan(delta_b) cos(theta) - sin(theta)) [N/m], the force that the barrier at rest withstands.
+
+        Infinite where it is fixed.
+        """
         if self.barrier_mass is None or self.fixed:
             return math.inf
         return self.barrier_mass * self.friction_deceleration
 
     @property
     def friction_deceleration(self) -> float:
-        """g tan(delta_b) [m/s^2], Eq. (A30)."""
-        return self.gravity * (self.base_friction or 0.0)
+        """g (tan(delta_b) cos(theta) - sin(theta)) [m/s^2]; 0 where the barrier is fixed."""
+        return 0.0 if self.fixed else friction_deceleration(self.gravity, self.base_friction or 0.0, self.slope)
 
     @property
     def threshold_force(self) -> float:
@@ -428,6 +435,15 @@ class Impact:
             yield Phase("rest", stop, 0.0, 0.0, self.impulse, flow, at_rest)
 
 
+def friction_deceleration(gravity: float, base_friction: float, slope: float) -> float:
+    """g (tan(delta_b) cos(theta) - sin(theta)) [m/s^2], with which a sliding barrier slows down; theta in degrees.
+
+    Eq. (A30), with the slope that the paper does not have.
+    """
+    angle = math.radians(slope)
+    return gravity * (base_friction * math.cos(angle) - math.sin(angle))
+
+
 def coulomb_motion(
     start: float, end: float, force: float, force_rate: float, before: Motion, mass: float, friction: float
 ) -> Iterator[Motion]:
@@ -526,6 +542,7 @@ def _check(impact: Impact) -> None:
         _require("geometry_change", impact.geometry_change, 0, 1, open_low=True, why=" (it is s1max / flow_length)")
     else:
         raise ValueError("geometry_change is missing, give a number in (0, 1] or s1max in metres.")
+    _require("slope", impact.slope, -90, 90, open_low=True, open_high=True, why=" degrees")
     v20 = impact.barrier_initial_velocity
     if impact.fixed:
         _require("barrier_initial_velocity", v20, 0, 0, why=" (the barrier is fixed)")
@@ -535,6 +552,12 @@ def _check(impact: Impact) -> None:
     if impact.base_friction is None:
         raise ValueError("base_friction is missing, a barrier that is not fixed needs a number in [0, inf).")
     _require("base_friction", impact.base_friction, 0, math.inf)
+    steepest = abs(math.tan(math.radians(impact.slope)))
+    if impact.slope != 0 and impact.base_friction <= steepest:
+        raise ValueError(
+            f"base_friction is {impact.base_friction!r}, on a slope of {impact.slope:g} degrees it must be above "
+            f"{steepest:.4g}, else the barrier slides by its own weight."
+        )
     if impact.vertical_load_ratio * impact.base_friction >= 1:
         limit = 1 / impact.base_friction
         raise ValueError(f"vertical_load_ratio is {impact.vertical_load_ratio!r}, it must be in [0, {limit:g}).")

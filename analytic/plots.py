@@ -170,7 +170,9 @@ def comparison(title: str, figures: Mapping[str, Mapping[str, KeyFigures]], slid
         for index, source in enumerate(sources):
             values = [_number(getattr(record.get(source), name, None)) * factor for record in figures.values()]
             colour = GREY if source == "simulated" else (BLUE, ORANGE, GREEN, PURPLE)[index % 4]
-            axis.bar(place + (index - (len(sources) - 1) / 2) * width, values, width, color=colour, label=source)
+            bars = axis.bar(place + (index - (len(sources) - 1) / 2) * width, values, width, color=colour, label=source)
+            bounds = ["≥" if name in getattr(record.get(source), "at_least", ()) else "" for record in figures.values()]
+            axis.bar_label(bars, bounds, fontsize=8)
         axis.set_ylabel(label)
         axis.set_xticks(place, list(figures), rotation=25, ha="right", fontsize=8)
         axis.grid(alpha=0.3, axis="y")

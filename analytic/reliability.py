@@ -42,6 +42,9 @@ class Distribution:
     kind: str
     parameters: tuple[float, ...]
 
+    def __str__(self) -> str:
+        return f"{self.kind}({', '.join(f'{value:g}' for value in self.parameters)})"
+
     def quantile(self, probability: Array, low: float = -math.inf, high: float = math.inf) -> Array:
         """Values at the probabilities in (0, 1), of the distribution cut off at ``low`` and ``high``."""
         start, end = (float(self._cumulative(bound)) for bound in (low, high))
@@ -169,6 +172,7 @@ def reliability(
     seed: int = 1,
     variant: str = "stick_slip",
     gravity: float = STANDARD_GRAVITY,
+    slope: float = 0.0,
 ) -> Reliability:
     """Sample the closed form.
 
@@ -187,7 +191,7 @@ def reliability(
     uniform = _uniform(limit, samples, len(uncertain), seed)
 
     def displacement(points: Array) -> Array:
-        return _displacement(_values(fixed, uncertain, points), len(points), variant, gravity)
+        return _displacement(_values(fixed, uncertain, points), len(points), variant, gravity, slope)
 
     moved = displacement(uniform)
     exceeding = int(np.count_nonzero(moved > limit))
@@ -213,6 +217,7 @@ def lightest_mass(
     seed: int = 1,
     variant: str = "stick_slip",
     gravity: float = STANDARD_GRAVITY,
+    slope: float = 0.0,
 ) -> float:
     """Least barrier mass [kg/m] that slides beyond ``limit`` [m] with at most the given probability.
 
@@ -230,7 +235,7 @@ def lightest_mass(
 
     def share(mass: float) -> float:
         values["barrier_mass"] = mass
-        return float(np.mean(_displacement(values, samples, variant, gravity) > limit))
+        return float(np.mean(_displacement(values, samples, variant, gravity, slope) > limit))
 
     low, high = MASS_RATIOS[0] * typical, MASS_RATIOS[1] * typical
     if share(high) > probability:
@@ -259,8 +264,8 @@ def _values(fixed: Mapping[str, Any], uncertain: Mapping[str, Distribution], poi
     return values
 
 
-def _displacement(values: Mapping[str, Any], count: int, variant: str, gravity: float) -> Array:
-    found = outcomes(**values, variant=variant, gravity=gravity).barrier_displacement_final
+def _displacement(values: Mapping[str, Any], count: int, variant: str, gravity: float, slope: float) -> Array:
+    found = outcomes(**values, variant=variant, gravity=gravity, slope=slope).barrier_displacement_final
     if not np.all(np.isfinite(found)):
         raise ValueError("base_friction must be above 0, without it a barrier that slides never stops.")
     return np.broadcast_to(found, (count,))

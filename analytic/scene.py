@@ -47,17 +47,21 @@ class Scene:
     """tan(delta_b) [-] of a barrier that may slide."""
     gravity: float = STANDARD_GRAVITY
     """[m/s^2]."""
+    slope: float = 0.0
+    """theta [degrees], by which the ground falls in the direction of the flow."""
     porosity: float | None = None
     """n [-]."""
     face_angle: float | None = None
     """beta, angle of the impacted face with the base [degrees]."""
     barrier_height: float | None = None
     """H [m]; infinite for a wall without end."""
+    barrier_density: float | None = None
+    """[kg/m^3]."""
     distance: float = 0.0
     """From the flow's front to the toe of the barrier [m]."""
     title: str = ""
     remarks: tuple[str, ...] = ()
-    """What of the scene the closed form does not see."""
+    """What of the file the scene does not hold."""
 
     @property
     def fixed(self) -> bool:
@@ -73,6 +77,25 @@ class Scene:
     def froude_number(self) -> float:
         """Fr = v / sqrt(g h) [-]."""
         return self.speed / math.sqrt(self.gravity * self.flow_height)
+
+    @property
+    def weight_on_base(self) -> float:
+        """m2 g cos(theta) [N/m], with which a barrier that may slide presses on its base; 0 for a fixed one."""
+        return (self.barrier_mass or 0.0) * self.gravity * math.cos(math.radians(self.slope))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the closed form does not see, in sentences."""
+        if self.slope == 0:
+            return self.remarks
+        pull = self.flow_mass * self.gravity * math.sin(math.radians(self.slope))
+        seen = "" if self.fixed else "the barrier's weight along it is counted, "
+        effect = "pushes on: forces and displacements come out too small" if pull > 0 else "holds the flow back"
+        size = f"{abs(pull) / 1e3:.3g} kN/m"
+        return (
+            *self.remarks,
+            f"Slope of {self.slope:g} degrees: {seen}the flow's is left out, {size}, which {effect}.",
+        )
 
     @property
     def paper_geometry_change(self) -> float:
@@ -91,6 +114,7 @@ class Scene:
             "speed": self.speed,
             "base_friction": self.base_friction,
             "gravity": self.gravity,
+            "slope": self.slope,
         }
         return Impact(**(scene | {"rise_ratio": ASSUMED_RISE_RATIO} | model))
 
@@ -130,8 +154,6 @@ def scene_of(content: Any, name: str = "The scenario") -> Scene:
     remarks = []
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
-    if get.number("gravity.tilt_deg", 0.0) != 0:
-        remarks.append(f"The ground's slope of {get.number('gravity.tilt_deg'):g} degrees is left out.")
     if get.number("ground.friction", 0.0) != 0:
         remarks.append("The friction between flow and ground is left out.")
     if get.text("barrier.shape.kind") == "wall":
@@ -139,11 +161,14 @@ def scene_of(content: Any, name: str = "The scenario") -> Scene:
     else:
         area, face_angle, barrier_height = _trapezoid(get)
     motion = get.text("barrier.motion.kind")
-    mass = friction = None
+    mass = friction = density = None
     if motion == "sliding":
         mass = get.number("barrier.motion.mass_kg_per_m", None)
         if mass is None:
-            mass = area * get.number("barrier.motion.density_kg_per_m3")
+            density = get.number("barrier.motion.density_kg_per_m3")
+            mass = area * density
+        elif math.isfinite(area):
+            density = mass / area
         friction = get.number("barrier.motion.base_friction", None)
         if friction is None:
             angle = get.number("barrier.motion.base_soil_friction_angle_deg")
@@ -159,9 +184,11 @@ def scene_of(content: Any, name: str = "The scenario") -> Scene:
         barrier_mass=mass,
         base_friction=friction,
         gravity=get.number("gravity.acceleration_m_per_s2", STANDARD_GRAVITY),
+        slope=get.number("gravity.tilt_deg", 0.0),
         porosity=porosity,
         face_angle=face_angle,
         barrier_height=barrier_height,
+        barrier_density=density,
         distance=distance,
         remarks=tuple(remarks),
     )

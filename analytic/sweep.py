@@ -15,8 +15,8 @@ from typing import Any
 
 from scipy.stats import qmc
 
-from analytic.calibration import measure, measured_key_figures, measured_vertical_load_ratio
-from analytic.scene import Scene, read_scene
+from analytic.calibration import CalibrationError, at_rest, measure, measured_key_figures, measured_vertical_load_ratio
+from analytic.scene import Scene, SceneError, read_scene
 from analytic.time_series import read_time_series
 
 RANGES = {
@@ -175,16 +175,20 @@ def collect(folder: Path) -> Run:
 
     Raises
     ------
-    SceneError, TimeSeriesError, CalibrationError: the folder holds no usable record of an impact.
+    SceneError, TimeSeriesError, CalibrationError: the folder holds no usable record of an impact, or one that ends
+    before the impact does, or of an impact on a slope, for which the table has no column.
     """
     scene, series = read_scene(folder), read_time_series(folder)
+    if scene.slope != 0:
+        raise SceneError(f"{folder}: gravity.tilt_deg is {scene.slope:g}, a sweep is of level ground.")
     measured = measure(series["time"], series["impact_force_x"])
+    if measured.warning is not None:
+        raise CalibrationError(f"{folder}: {measured.warning}.")
     figures = measured_key_figures(series, measured)
     kappa = displacement = largest = math.nan
     if scene.barrier_mass is not None:
-        weight = scene.barrier_mass * scene.gravity
         kappa = measured_vertical_load_ratio(
-            series["time"], series["impact_force_x"], series["base_normal_force"], weight, measured
+            series["time"], series["impact_force_x"], series["base_normal_force"], scene.weight_on_base, measured
         )
         displacement, largest = float(series["barrier_displacement"][-1]), float(series["barrier_velocity"].max())
     return Run(
@@ -206,7 +210,7 @@ def collect(folder: Path) -> Run:
         vertical_load_ratio=kappa,
         barrier_displacement_final=displacement,
         barrier_velocity_max=largest,
-        at_rest=scene.fixed or float(series["barrier_velocity"][-1]) == 0.0,
+        at_rest=scene.fixed or at_rest(series),
     )
 
 

@@ -238,7 +238,14 @@ def _comparison(found: CrossCheck) -> tuple[str, list[str], list[list[str]], lis
 
     header = ["", *(f"{label} [{unit}]" for label, unit, _ in FIGURES.values()), *(f"rms {s}" for s in CURVES.values())]
     rows = [
-        ["simulation", *(number(factor * found.figures[key]) for key, (_, _, factor) in FIGURES.items()), "", "", ""]
+        [
+            "simulation",
+            *(
+                ("≥ " if key in found.at_least else "") + number(factor * found.figures[key])
+                for key, (_, _, factor) in FIGURES.items()
+            ),
+            *("" for _ in CURVES),
+        ]
     ]
     for comparison in found.comparisons:
         cells = []
@@ -262,7 +269,7 @@ def _comparison(found: CrossCheck) -> tuple[str, list[str], list[list[str]], lis
     ]
     notes += [
         f"Simulated force: {found.filter_rule}. rms: over the largest simulated value.",
-        *found.scene.remarks,
+        *found.notes,
     ]
     return found.title, header, rows, notes
 

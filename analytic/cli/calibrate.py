@@ -34,16 +34,19 @@ def calibrate(
     """
     with refusals():
         check_plot(plot)
-        from analytic.calibration import RULES, misfit
+        from analytic.calibration import RULES, misfit, warnings
 
         rows: list[list[str]] = []
         content: list[dict[str, Any]] = []
         drawn = []
         rule_of_filtering = ""
+        told: list[str] = []
         for path in records:
             name, series, scene = load(path, scenario)
             kappa = _vertical_load_ratio(series, scene, filter_window)
             fits = [_fit(series, scene, rule, filter_window, kappa if with_vertical_load else None) for rule in RULES]
+            found_wanting = [f"{warning}." for warning in warnings(series, fits[0].measured)]
+            told += [f"{name}: {note}" for note in [*scene.notes, *found_wanting]]
             drawn.append((f"{name}: {scene.title}", series, fits))
             for fit in fits:
                 found = misfit(fit.impact, series, fit.measured)
@@ -59,7 +62,7 @@ def calibrate(
                         *("–" if value is None else f"{100 * value:.1f} %" for value in misfits),
                     ]
                 )
-                content.append(_as_dict(path, fit, kappa, found))
+                content.append(_as_dict(path, fit, kappa, found) | {"notes": [*scene.notes, *found_wanting]})
             rule_of_filtering = fits[0].measured.filter_rule
         if as_json:
             print_json(content)
@@ -67,6 +70,9 @@ def calibrate(
             notes = [f"Filter: {rule_of_filtering}.", "κ: recorded vertical over horizontal impulse on the barrier."]
             if any(not entry["within_range"] for entry in content):
                 notes.append("*: beyond s1max = L or τ = 1; the misfits are those of the nearest values within.")
+            if any(entry["measured"]["at_least"] for entry in content):
+                notes.append("Where the impact is not over, least squares and κ are of the part that was recorded.")
+            notes += told
             header = ["run", "rule", "s1max [m]", "λ", "τ", "κ", "misfit F", "E_k1", "v2", "Δx"]
             print_table("Calibration of the closed form", header, rows, notes)
         if plot is not None:
@@ -104,9 +110,8 @@ def _vertical_load_ratio(series: Any, scene: Any, filter_window: float) -> float
     if scene.fixed or "base_normal_force" not in series:
         return None
     measured = measure(series["time"], series["impact_force_x"], filter_window)
-    weight = scene.barrier_mass * scene.gravity
     return measured_vertical_load_ratio(
-        series["time"], series["impact_force_x"], series["base_normal_force"], weight, measured
+        series["time"], series["impact_force_x"], series["base_normal_force"], scene.weight_on_base, measured
     )
 
 
@@ -129,6 +134,7 @@ def _as_dict(path: Path, fit: Any, kappa: float | None, found: Any) -> dict[str,
             "duration": measured.duration,
             "impulse": measured.impulse,
             "residual_force": measured.residual_force,
+            "at_least": measured.at_least,
         },
         "misfit": {
             "force": found.force,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +11,7 @@ import typer
 from analytic.cli.calibrate import load
 from analytic.cli.predict import choose_model, make_impact, option
 from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
-from analytic.fitted import CALIBRATED, calibrated_impact
+from analytic.fitted import CALIBRATED, beyond_fit, calibrated_impact
 from analytic.impact import VARIANTS
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, read_scene
 
@@ -53,8 +54,9 @@ def compare(
 ) -> None:
     """Hold the closed form, without fitting it to them, against simulations; or its variants against each other.
 
-    In brackets: the difference from the simulated value. For one scenario, also what the pressure formulas say of
-    the same flow on a fixed barrier.
+    In brackets: the difference from the simulated value. A value marked ≥ is as far as the record goes, in which the
+    impact or the barrier's motion did not end; nothing is compared with it. For one scenario, also what the pressure
+    formulas say of the same flow on a fixed barrier.
     """
     with refusals():
         check_plot(plot)
@@ -65,13 +67,21 @@ def compare(
         given = {"geometry_change": geometry_change, "rise_ratio": rise_ratio}
         scenes: dict[str, Scene] = {}
         found: dict[str, dict[str, Any]] = {}
+        notes: dict[str, list[str]] = {}
         for path in paths:
             name = path.stem if path.is_file() else path.name or str(path)
-            found[name], scenes[name] = _figures(path, variant or known, given, reference_speed, filter_window)
+            found[name], scenes[name], notes[name] = _figures(
+                path, variant or known, given, reference_speed, filter_window
+            )
         if as_json:
-            print_json({name: {source: vars(f) for source, f in rows.items()} for name, rows in found.items()})
+            print_json(
+                {
+                    name: {source: vars(figures) for source, figures in rows.items()} | {"notes": notes[name]}
+                    for name, rows in found.items()
+                }
+            )
         else:
-            _print(found, scenes)
+            _print(found, scenes, notes)
         if plot is not None:
             write_plot(lambda: _figure(found, scenes), plot)
 
@@ -82,38 +92,44 @@ def _figures(
     given: dict[str, float | None],
     reference_speed: float | None,
     filter_window: float,
-) -> tuple[dict[str, Any], Scene]:
-    """Key figures by source, and the scene, of a run folder or a scenario file."""
-    from analytic.calibration import key_figures, measure, measured_key_figures
+) -> tuple[dict[str, Any], Scene, list[str]]:
+    """Key figures by source, the scene, and what is to be known of both, of a run folder or a scenario file."""
+    from analytic.calibration import key_figures, measure, measured_key_figures, warnings
 
     rows: dict[str, Any] = {}
+    notes: list[str] = []
     if path.is_dir():
         _, series, scene = load(path, None)
         measured = measure(series["time"], series["impact_force_x"], filter_window)
         rows[SIMULATED] = measured_key_figures(series, measured)
+        notes += [f"≥: {warning}." for warning in warnings(series, measured)]
     else:
         scene = read_scene(path)
     for name in variants:
         if scene.fixed and name in VARIANTS[1:]:
             continue  # a fixed barrier does not tell them from the first
-        if name == CALIBRATED:
-            impact = calibrated_impact(scene)
-        else:
-            model, _ = choose_model(scene, name, given)
-            impact = make_impact(scene, model, reference_speed)
+        try:
+            if name == CALIBRATED:
+                impact = calibrated_impact(scene)
+                notes += [f"{CALIBRATED}: {sentence}" for sentence in beyond_fit(scene)]
+            else:
+                model, _ = choose_model(scene, name, given)
+                impact = make_impact(scene, model, reference_speed)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
         rows[name] = key_figures(impact)
-    return rows, scene
+    return rows, scene, [*scene.notes, *notes]
 
 
-def _print(found: dict[str, dict[str, Any]], scenes: dict[str, Scene]) -> None:
+def _print(found: dict[str, dict[str, Any]], scenes: dict[str, Scene], notes: dict[str, list[str]]) -> None:
     rows = []
     for name, sources in found.items():
         reference = sources.get(SIMULATED)
         for source, figures in sources.items():
             cells = [_cell(figures, reference, column, factor) for column, (_, factor) in COLUMNS.items()]
             rows.append([name if source == next(iter(sources)) else "", source, *cells])
-    remarks = [f"{name}: {remark}" for name, scene in scenes.items() for remark in scene.remarks]
-    print_table("Impact", ["scene", "source", *(label for label, _ in COLUMNS.values())], rows, remarks)
+    told = [f"{name}: {note}" for name in found for note in notes[name]]
+    print_table("Impact", ["scene", "source", *(label for label, _ in COLUMNS.values())], rows, told)
     if len(scenes) == 1 and SIMULATED not in next(iter(found.values())):
         _print_pressures(next(iter(scenes.values())))
 
@@ -121,8 +137,10 @@ def _print(found: dict[str, dict[str, Any]], scenes: dict[str, Scene]) -> None:
 def _cell(figures: Any, reference: Any, column: str, factor: float) -> str:
     value = getattr(figures, column)
     text = number(None if value is None else value * factor)
-    base = None if reference is None else getattr(reference, column)
-    if figures is reference or not base or value is None:
+    if column in figures.at_least:
+        return f"≥ {text}"
+    base = None if reference is None or column in reference.at_least else getattr(reference, column)
+    if figures is reference or not base or value is None or math.isinf(value):
         return text
     return f"{text} ({100 * (value / base - 1):+.0f} %)"
 

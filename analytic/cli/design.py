@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,15 +11,46 @@ import typer
 
 from analytic.cli.predict import option
 from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
-from analytic.impact import STANDARD_GRAVITY
+from analytic.fitted import beyond_fit
+from analytic.impact import STANDARD_GRAVITY, friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene, read_scene
+
+ASSUMED_DENSITY = 2000.0
+"""Density of the barrier [kg/m^3] where neither an option nor the scenario gives it."""
+
+ASSUMED_HEIGHT_RATIO = 2.0
+"""Likewise H / h [-]."""
+
+INPUTS = {
+    "density": ("density of the flow ρ", "kg/m³"),
+    "flow_length": ("length of the flow L", "m"),
+    "flow_height": ("depth of the flow h", "m"),
+    "speed": ("velocity of the flow v", "m/s"),
+    "gravity": ("gravity g", "m/s²"),
+    "slope": ("slope of the ground θ", "°"),
+    "barrier_mass": ("mass of the barrier m2", "kg/m"),
+    "base_friction": ("base friction tan δ_b", "-"),
+    "barrier_density": ("density of the barrier", "kg/m³"),
+    "barrier_height": ("height of the barrier H", "m"),
+    "least_crest_width": ("least crest width b", "m"),
+    "face_angle": ("face angle β", "°"),
+    "geometry_change": ("λ", "-"),
+    "rise_ratio": ("τ", "-"),
+    "vertical_load_ratio": ("vertical load κ", "-"),
+}
+"""What an answer rests on: label and unit of the table."""
 
 FORMS = "a number, or normal(mean, deviation), lognormal(mean, variation), uniform(low, high), triangular(a, mode, b)"
 
 
 def design(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Scenario file for the flow; options override it.", show_default=False)
+        Path | None,
+        typer.Argument(
+            help="Scenario file for the flow, the ground and the barrier's height, density and base friction; "
+            "options override it.",
+            show_default=False,
+        ),
     ] = None,
     limit: Annotated[float | None, option("--limit", help="Greatest final displacement [m].")] = None,
     density: Annotated[str | None, option("--density", help=f"ρ of the flow [kg/m³]: {FORMS}.")] = None,
@@ -27,14 +59,18 @@ def design(
     speed: Annotated[str | None, option("--speed", help="v1,0 [m/s], likewise.")] = None,
     base_friction: Annotated[str | None, option("--base-friction", help="tan δ_b [-], likewise.")] = None,
     geometry_change: Annotated[
-        str, typer.Option("--lambda", "--geometry-change", help="λ [-], likewise.")
-    ] = f"{PAPER_GEOMETRY_CHANGE['sliding']}",
+        str | None,
+        option(
+            "--lambda", "--geometry-change", help=f"λ [-], likewise; {PAPER_GEOMETRY_CHANGE['sliding']} if not given."
+        ),
+    ] = None,
     rise_ratio: Annotated[
-        str, typer.Option("--tau", "--rise-ratio", help="τ [-], likewise.")
-    ] = f"{ASSUMED_RISE_RATIO}",
+        str | None, option("--tau", "--rise-ratio", help=f"τ [-], likewise; {ASSUMED_RISE_RATIO} if not given.")
+    ] = None,
     vertical_load_ratio: Annotated[
-        str, typer.Option("--vertical-load-ratio", help="Vertical over horizontal force [-], likewise.")
-    ] = "0",
+        str | None,
+        option("--vertical-load-ratio", help="Vertical over horizontal force [-], likewise; 0 if not given."),
+    ] = None,
     calibrated: Annotated[
         bool, typer.Option("--calibrated", help="Take λ, τ and the vertical load from the fit to simulations.")
     ] = False,
@@ -44,15 +80,29 @@ def design(
     probability: Annotated[
         float | None, option("--probability", help="Accepted probability of sliding beyond the limit.")
     ] = None,
-    height: Annotated[float | None, option("--height", help="H [m] of the barrier; 2 h if not given.")] = None,
-    crest_width: Annotated[float, typer.Option("--crest-width", help="Least crest width b [m].")] = 1.0,
+    height: Annotated[
+        float | None, option("--height", help="H [m] of the barrier; the scenario's, or 2 h if it has none.")
+    ] = None,
+    crest_width: Annotated[
+        float | None, option("--crest-width", help="Least crest width b [m]; 1 if not given.")
+    ] = None,
     face_angle: Annotated[
-        tuple[float, float], typer.Option("--face-angle", help="Least and greatest face angle β [degrees].")
-    ] = (60.0, 80.0),
-    barrier_density: Annotated[float, typer.Option("--barrier-density", help="Density [kg/m³].")] = 2000.0,
+        tuple[float, float] | None,
+        option("--face-angle", help="Least and greatest face angle β [degrees]; 60 and 80 if not given."),
+    ] = None,
+    barrier_density: Annotated[
+        float | None,
+        option("--barrier-density", help=f"Density [kg/m³]; the scenario's, or {ASSUMED_DENSITY:g} if it has none."),
+    ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Number of samples.")] = 1_000_000,
     seed: Annotated[int, typer.Option("--seed", help="Of the random numbers.")] = 1,
-    gravity: Annotated[float, typer.Option("--gravity", help="g [m/s²].")] = STANDARD_GRAVITY,
+    gravity: Annotated[
+        float | None, option("--gravity", help=f"g [m/s²]; the scenario's, or {STANDARD_GRAVITY}.")
+    ] = None,
+    slope: Annotated[
+        float | None,
+        option("--slope", help="θ [degrees], by which the ground falls in the flow's direction; likewise, or 0."),
+    ] = None,
     as_json: AsJson = False,
     plot: Plot = None,
 ) -> None:
@@ -69,16 +119,26 @@ def design(
 
         if limit is None:
             raise ValueError("limit is missing, give --limit in metres.")
-        texts = _texts(scenario, density, flow_length, flow_height, speed, base_friction)
-        texts |= {
-            "geometry_change": geometry_change,
-            "rise_ratio": rise_ratio,
-            "vertical_load_ratio": vertical_load_ratio,
+        base = None if scenario is None else read_scene(scenario)
+        inputs = _Inputs(base)
+        flow = {
+            "density": density,
+            "flow_length": flow_length,
+            "flow_height": flow_height,
+            "speed": speed,
+            "base_friction": base_friction,
         }
+        values: dict[str, Any] = {name: inputs.needed(name, text, parse) for name, text in flow.items()}
+        model = {
+            "geometry_change": (geometry_change, PAPER_GEOMETRY_CHANGE["sliding"]),
+            "rise_ratio": (rise_ratio, ASSUMED_RISE_RATIO),
+            "vertical_load_ratio": (vertical_load_ratio, 0.0),
+        }
+        for name, (text, assumed) in model.items():
+            values[name] = inputs.choose(name, None if text is None else parse(name, text), assumed)
         if barrier_mass is not None:
-            texts["barrier_mass"] = barrier_mass
-        inputs = {name: parse(name, text) for name, text in texts.items()}
-        medians = {name: _median(value, name) for name, value in inputs.items()}
+            values["barrier_mass"] = inputs.choose("barrier_mass", parse("barrier_mass", barrier_mass), None)
+        medians = {name: _median(value, name) for name, value in values.items()}
         scene = Scene(
             flow_mass=medians["density"] * medians["flow_length"] * medians["flow_height"],
             flow_length=medians["flow_length"],
@@ -86,16 +146,18 @@ def design(
             speed=medians["speed"],
             barrier_mass=1.0,
             base_friction=medians["base_friction"],
-            gravity=gravity,
+            gravity=inputs.choose("gravity", gravity, STANDARD_GRAVITY),
+            slope=inputs.choose("slope", slope, 0.0),
+            remarks=() if base is None else base.remarks,
         )
         bounds = Bounds(
-            height=2 * scene.flow_height if height is None else height,
-            crest_width=crest_width,
-            face_angle=face_angle,
-            density=barrier_density,
+            height=inputs.choose("barrier_height", height, ASSUMED_HEIGHT_RATIO * scene.flow_height),
+            density=inputs.choose("barrier_density", barrier_density, ASSUMED_DENSITY),
+            crest_width=inputs.choose("least_crest_width", crest_width, 1.0),
+            face_angle=inputs.choose("face_angle", face_angle, (60.0, 80.0)),
         )
-        job = _Job(scene, inputs, medians, limit, bounds, samples, seed, calibrated, as_json, plot)
-        if any(isinstance(value, Distribution) for value in inputs.values()):
+        job = _Job(scene, inputs, values, medians, limit, bounds, samples, seed, calibrated, as_json, plot)
+        if any(isinstance(value, Distribution) for value in values.values()):
             if calibrated:
                 raise ValueError("calibrated is for numbers; with distributions give λ, τ and the vertical load.")
             job.uncertain(probability, mass_given=barrier_mass is not None)
@@ -106,20 +168,60 @@ def design(
             job.certain()
 
 
-def _texts(scenario: Path | None, *given: str | None) -> dict[str, str]:
-    """Flow and base friction as texts, from the options or else from the scenario."""
-    names = ("density", "flow_length", "flow_height", "speed", "base_friction")
-    texts = {name: text for name, text in zip(names, given, strict=True) if text is not None}
-    if scenario is not None:
-        scene = read_scene(scenario)
-        for name in names:
-            if name not in texts and getattr(scene, name) is not None:
-                texts[name] = repr(getattr(scene, name))
-    for name in names:
-        if name not in texts:
+class _Inputs:
+    """What the answer rests on, and where each value is from."""
+
+    def __init__(self, scene: Scene | None):
+        self.scene = scene
+        self.chosen: dict[str, tuple[Any, str]] = {}
+
+    def choose(self, name: str, given: Any, assumed: Any) -> Any:
+        """The given value, or else the scenario's where it has a finite one, or else the assumed one."""
+        # The scenario's face angle is that of its barrier, not the range in which one is looked for.
+        own = None if name == "face_angle" else getattr(self.scene, name, None)
+        if given is not None:
+            self.chosen[name] = (given, "given")
+        elif own is not None and math.isfinite(own):
+            self.chosen[name] = (own, "scenario")
+        else:
+            self.chosen[name] = (assumed, "assumed")
+        return self.chosen[name][0]
+
+    def needed(self, name: str, text: str | None, parse: Any) -> Any:
+        """As ``choose``, of the text of a number or a distribution, and refused where there is none."""
+        value = self.choose(name, None if text is None else parse(name, text), None)
+        if value is None:
             where = " or a scenario of a sliding barrier" if name == "base_friction" else " or a scenario file"
             raise ValueError(f"{name} is missing, give --{name.replace('_', '-')}{where}.")
-    return texts
+        return value
+
+    def drop_shape(self) -> None:
+        """Leave out what bounds the shape, of which a barrier of given mass needs nothing."""
+        for name in ("barrier_density", "barrier_height", "least_crest_width", "face_angle"):
+            del self.chosen[name]
+
+    def fitted(self, coefficients: Any) -> None:
+        """Take λ, τ and the vertical load from the fit."""
+        for name in ("geometry_change", "rise_ratio", "vertical_load_ratio"):
+            self.chosen[name] = (getattr(coefficients, name), "fitted")
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; a distribution as it is written, bounds of the face angle as a list."""
+        return {
+            name: {"value": value if isinstance(value, float | tuple) else str(value), "source": source}
+            for name, (value, source) in self.chosen.items()
+        }
+
+    def print(self, notes: list[str]) -> None:
+        """One row for each value."""
+        rows = []
+        for name, (label, unit) in INPUTS.items():
+            if name not in self.chosen:
+                continue
+            value, source = self.chosen[name]
+            text = " to ".join(map(number, value)) if isinstance(value, tuple) else str(value)
+            rows.append([label, number(value) if isinstance(value, float) else text, unit, source])
+        print_table("What this rests on", ["input", "value", "unit", "from"], rows, notes)
 
 
 def _median(value: Any, name: str) -> float:
@@ -138,7 +240,8 @@ class _Job:
     def __init__(
         self,
         scene: Scene,
-        inputs: dict[str, Any],
+        inputs: _Inputs,
+        values: dict[str, Any],
         medians: dict[str, float],
         limit: float,
         bounds: Any,
@@ -150,7 +253,7 @@ class _Job:
     ):
         from analytic import fitted
 
-        self.scene, self.inputs, self.limit, self.bounds = scene, inputs, limit, bounds
+        self.scene, self.inputs, self.values, self.limit, self.bounds = scene, inputs, values, limit, bounds
         self.samples, self.seed, self.as_json, self.plot = samples, seed, as_json, plot
         self.calibrated = calibrated
         names = ("geometry_change", "rise_ratio", "vertical_load_ratio")
@@ -166,6 +269,15 @@ class _Job:
         from analytic.design import lightest_barrier
 
         found = lightest_barrier(self.scene, self.limit, self.bounds, self.rule)
+        designed = replace(
+            self.scene, barrier_mass=found.mass, face_angle=found.face_angle, barrier_height=found.height
+        )
+        notes = _notes(designed)
+        if self.calibrated:
+            self.inputs.fitted(found.coefficients)
+            notes += beyond_fit(designed)
+        else:
+            notes.append("Of the barrier the closed form sees the mass alone; equally light shapes slide alike.")
         if self.as_json:
             print_json(
                 {
@@ -179,6 +291,9 @@ class _Job:
                     "limit": self.limit,
                     "governed_by": found.governed_by,
                     "coefficients": found.coefficients.model,
+                    "base_resistance": _base_resistance(designed),
+                    "inputs": self.inputs.as_dict(),
+                    "notes": notes,
                 }
             )
         else:
@@ -186,14 +301,12 @@ class _Job:
                 *_shape_rows((found.base_width, found.crest_width, found.height, found.face_angle), found.mass),
                 ["mass over the flow's", number(found.mass / self.scene.flow_mass), "-"],
                 ["final displacement", number(found.displacement), "m"],
+                ["base resistance R", number(_base_resistance(designed) / 1e3), "kN/m"],
                 ["governed by", found.governed_by, ""],
             ]
-            at = found.coefficients
-            notes = [f"λ = {at.geometry_change:.3g}, τ = {at.rise_ratio:.3g}, κ = {at.vertical_load_ratio:.3g}"]
-            if not self.calibrated:
-                notes.append("Of the barrier the closed form sees the mass alone; equally light shapes slide alike.")
             title = f"Lightest barrier that slides at most {self.limit:g} m"
-            print_table(title, ["quantity", "value", "unit"], rows, notes)
+            print_table(title, ["quantity", "value", "unit"], rows)
+            self.inputs.print(notes)
         if self.plot is not None:
             write_plot(lambda: self._chart(found.mass, found.face_angle), self.plot)
 
@@ -204,9 +317,14 @@ class _Job:
 
         if mass_given and probability is not None:
             raise ValueError("barrier_mass and probability are both given, give only one.")
+        sampling: dict[str, Any] = {
+            "samples": self.samples,
+            "seed": self.seed,
+            "gravity": self.scene.gravity,
+            "slope": self.scene.slope,
+        }
         if probability is not None:
-            sampling: dict[str, Any] = {"samples": self.samples, "seed": self.seed, "gravity": self.scene.gravity}
-            mass = lightest_mass(self.inputs, self.limit, probability, **sampling)
+            mass = lightest_mass(self.values, self.limit, probability, **sampling)
             which = f"lightest that slides beyond {self.limit:g} m with a probability of at most {probability:g}"
         elif mass_given:
             mass, which = self.given_mass or 0.0, "given"
@@ -214,10 +332,13 @@ class _Job:
             found = lightest_barrier(self.scene, self.limit, self.bounds, self.rule)
             mass, which = found.mass, "lightest for the medians"
         shape = None if mass_given else trapezoid(mass, self.bounds)
-        if shape is not None:
+        if shape is None:
+            self.inputs.drop_shape()
+        else:
             mass = self.bounds.density * shape[2] * (shape[0] + shape[1]) / 2
-        inputs = self.inputs if mass_given else {**self.inputs, "barrier_mass": mass}
-        result = reliability(inputs, self.limit, samples=self.samples, seed=self.seed, gravity=self.scene.gravity)
+        values = self.values if mass_given else {**self.values, "barrier_mass": mass}
+        result = reliability(values, self.limit, **sampling)
+        notes = _notes(replace(self.scene, barrier_mass=mass))
         if self.as_json:
             names = ("base_width", "crest_width", "height", "face_angle_deg")
             content: dict[str, Any] = {} if shape is None else dict(zip(names, shape, strict=True))
@@ -233,6 +354,8 @@ class _Job:
                     name: {"total": s.total, "first": s.first, "rank_correlation": s.rank_correlation}
                     for name, s in result.sensitivity.items()
                 },
+                "inputs": self.inputs.as_dict(),
+                "notes": notes,
             }
             print_json(content)
         else:
@@ -252,6 +375,7 @@ class _Job:
             ]
             header = ["input", "total Sobol' index", "first order", "rank correlation"]
             print_table("What the displacement depends on, the most important first", header, rows)
+            self.inputs.print(notes)
         if self.plot is not None:
             from analytic import plots
 
@@ -271,6 +395,21 @@ class _Job:
         )
         title = f"Final displacement; L = {self.scene.flow_length:g} m, h = {self.scene.flow_height:g} m"
         return plots.design_chart(ratios, speeds, moved, self.limit, (ratio, self.scene.speed), title)
+
+
+def _base_resistance(scene: Scene) -> float:
+    """R [N/m], the force that the barrier withstands before the flow comes."""
+    mass, friction = scene.barrier_mass or 0.0, scene.base_friction or 0.0
+    return mass * friction_deceleration(scene.gravity, friction, scene.slope)
+
+
+def _notes(scene: Scene) -> list[str]:
+    """What the closed form does not see, and whether a flow at rest would push the barrier on."""
+    pull = scene.flow_mass * scene.gravity * math.sin(math.radians(scene.slope))
+    if pull <= _base_resistance(scene):
+        return list(scene.notes)
+    heavier = "The flow's weight along the slope exceeds the base resistance: where the ground does not hold the flow, "
+    return [*scene.notes, heavier + "it pushes the barrier on for ever."]
 
 
 def _shape_rows(shape: tuple[float, float, float, float], mass: float) -> list[list[str]]:

@@ -56,6 +56,9 @@ def predict(
     gravity: Annotated[
         float | None, option("--gravity", help=f"g [m/s²]; {STANDARD_GRAVITY} unless a scenario says otherwise.")
     ] = None,
+    slope: Annotated[
+        float | None, option("--slope", help="θ [degrees], by which the ground falls in the flow's direction; 0.")
+    ] = None,
     as_json: AsJson = False,
     plot: Plot = None,
 ) -> None:
@@ -70,10 +73,11 @@ def predict(
             "speed": speed,
             "base_friction": base_friction,
             "gravity": gravity,
+            "slope": slope,
             "face_angle": face_angle,
         }
         scene = assemble(scenario, given, fixed)
-        notes = list(scene.remarks)
+        notes = list(scene.notes)
         given_model = {
             "s1max": s1max,
             "geometry_change": geometry_change,
@@ -178,6 +182,7 @@ def _inputs(impact: Impact) -> dict[str, Any]:
         "variant": impact.variant,
         "arrival_time": impact.arrival_time,
         "gravity": impact.gravity,
+        "slope": impact.slope,
     }
 
 
@@ -194,6 +199,8 @@ def _print(impact: Impact, title: str, notes: list[str]) -> None:
     )
     if not impact.fixed:
         inputs += f", tan δ_b = {impact.base_friction:g}"
+    if impact.slope:
+        inputs += f", θ = {impact.slope:g}°"
     if impact.vertical_load_ratio:
         inputs += f", κ = {impact.vertical_load_ratio:.4g}"
     if impact.variant == "as_printed":

@@ -47,7 +47,11 @@ def collect(
     out: Annotated[Path, typer.Option(help="CSV file to write.", show_default=False)],
     remark: Annotated[str, typer.Option(help="First line of the file, as a comment.")] = "",
 ) -> None:
-    """Gather what the runs say into one table; a folder without a usable record is named and left out."""
+    """Gather what the runs say into one table; a folder without a usable record is named and left out.
+
+    Usable is a record in which the impact ends. A run whose barrier still moves at the end of the record is in the
+    table, marked as not at rest, and takes no part in the fit.
+    """
     with refusals():
         from analytic import sweep as scenes
 
@@ -59,6 +63,9 @@ def collect(
                 typer.echo(f"Left out: {error}", err=True)
         if not rows:
             raise ValueError("No folder holds a usable record.")
+        for row in rows:
+            if not row.at_rest:
+                typer.echo(f"Not at rest: {row.name}, whose barrier still moves at the end of the record.", err=True)
         scenes.write_table(rows, out, remark)
         typer.echo(f"{len(rows)} of {len(runs)} runs in {out}")
 

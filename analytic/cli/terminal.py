@@ -38,7 +38,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     """
     columns = list(zip(header, *rows, strict=True))
     widths = [max(map(len, column)) for column in columns]
-    numeric = [all(cell[:1] in "0123456789+-–" or cell == "never" for cell in column[1:]) for column in columns[1:]]
+    numeric = [all(cell[:1] in "0123456789+-–≥" or cell == "never" for cell in column[1:]) for column in columns[1:]]
 
     def line(cells: Sequence[str]) -> str:
         padded = [

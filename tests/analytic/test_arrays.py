@@ -38,15 +38,18 @@ def random_inputs(count: int, seed: int) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.parametrize("slope", [0.0, 5.0, -5.0])
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_outcomes_equal_the_scalar_core(variant: str) -> None:
+def test_outcomes_equal_the_scalar_core(variant: str, slope: float) -> None:
     inputs = random_inputs(400, seed=3)
     if variant == "as_printed":
         inputs["vertical_load_ratio"] = np.zeros(400)
-    found = outcomes(**inputs, variant=variant)
+    if slope:
+        inputs["base_friction"] = inputs["base_friction"] + 1.01 * np.tan(np.radians(5.0))
+    found = outcomes(**inputs, variant=variant, slope=slope)
     for i in range(400):
         row: dict[str, Any] = {name: float(values[i]) for name, values in inputs.items()}
-        impact = Impact(**row, flow_height=1.0, variant=variant)
+        impact = Impact(**row, flow_height=1.0, variant=variant, slope=slope)
         for name in FIELDS:
             value, expected = float(getattr(found, name)[i]), getattr(impact, name)
             # Velocities and displacements are differences; what the two orders of evaluation share is the scale.
@@ -131,6 +134,8 @@ def test_a_thousand_take_as_many_calls_as_a_hundred() -> None:
         ({"geometry_change": 0.0}, r"geometry_change is 0, "),
         ({"vertical_load_ratio": 10.0}, r"vertical_load_ratio times base_friction must be below 1"),
         ({"variant": "other"}, r"variant is 'other'"),
+        ({"slope": 20.0}, r"base_friction is 0\.29, on a slope of 20 degrees it must be above 0\.364 everywhere"),
+        ({"slope": -20.0}, r"base_friction is 0\.29, on a slope of -20 degrees it must be above 0\.364 everywhere"),
     ],
 )
 def test_bad_inputs_are_named(change: dict[str, Any], sentence: str) -> None:

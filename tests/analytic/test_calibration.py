@@ -12,6 +12,7 @@ from analytic.calibration import CalibrationError, calibrate, measure, misfit
 from analytic.impact import Impact
 from analytic.scene import Scene
 from analytic.time_series import TimeSeriesError, read_time_series
+from warp_mpm.summary import impact_figures
 
 SLIDING = Scene(
     flow_mass=81000.0, flow_length=15.0, flow_height=3.0, speed=10.0, barrier_mass=90000.0, base_friction=0.29
@@ -105,6 +106,61 @@ def test_key_figures_of_record_and_model_agree() -> None:
     # The end of the impact is where a tenth of the peak is left: 1 % of the impulse of the falling side is cut off.
     assert found.impulse == pytest.approx(expected.impulse, rel=0.011)
     assert found.duration == pytest.approx(expected.duration * (1 - 0.1 * 0.65), abs=0.03)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6, 0.9])
+def test_a_record_that_ends_before_the_impact_is_told(share: float) -> None:
+    """Of a force that falls evenly, the last tenth looks like a residual force, over which the rest is soon over."""
+    impact = SLIDING.impact(geometry_change=0.72, rise_ratio=0.2, arrival_time=0.3)
+    whole = measure(*(record(impact)[name] for name in ("time", "impact_force_x")))
+    assert whole.over
+    assert whole.warning is None
+    assert whole.at_least == ()
+    series = record(impact, end=0.3 + share * impact.duration)
+    found = measure(series["time"], series["impact_force_x"])
+    assert not found.over
+    assert found.at_least == ("duration", "impulse")
+    assert f"the force is {found.residual_force / found.peak_force:.0%} of its peak" in (found.warning or "")
+    assert found.duration < whole.duration
+    assert found.impulse < whole.impulse
+    assert found.peak_force == whole.peak_force
+
+
+def test_a_surge_at_the_end_of_the_record_is_not_the_end_of_the_impact() -> None:
+    series = record(SLIDING.impact(geometry_change=0.41, rise_ratio=0.35))
+    force = series["impact_force_x"] + 1e5 * (series["time"] > 4.9)
+    found = measure(series["time"], force)
+    assert found.residual_force < calibration.SETTLED_SHARE * found.peak_force
+    assert not found.over
+
+
+def test_the_steady_thrust_of_a_flow_at_rest_is_no_impact() -> None:
+    series = record(SLIDING.impact(geometry_change=0.41, rise_ratio=0.35))
+    force = np.maximum(series["impact_force_x"], 1.5e5 * (series["time"] > 0.5))
+    found = measure(series["time"], force)
+    assert found.residual_force > 0.25 * found.peak_force
+    assert found.over
+
+
+@pytest.mark.parametrize("end", [1.0, 1.5, 2.0, 2.5, 3.0, 4.0])
+def test_the_simulator_s_summary_judges_alike(end: float) -> None:
+    series = record(SLIDING.impact(geometry_change=0.72, rise_ratio=0.2), end=end)
+    theirs = impact_figures(series["time"], series["impact_force_x"])
+    found = measure(series["time"], series["impact_force_x"])
+    assert found.over is (theirs["impact_end_time"] is not None)
+    if found.over:
+        assert found.duration == pytest.approx(theirs["impact_duration"], abs=0.01)
+
+
+def test_a_barrier_that_still_moves_is_told() -> None:
+    impact = SLIDING.impact(geometry_change=0.41, rise_ratio=0.35)
+    for end, moving in ((1.6, True), (5.0, False)):
+        series = record(impact, end=end)
+        measured = measure(series["time"], series["impact_force_x"])
+        bound = calibration.measured_key_figures(series, measured).at_least
+        assert ("barrier_displacement_final" in bound) is moving
+        assert any("the barrier still moves" in warning for warning in calibration.warnings(series, measured)) is moving
+        assert "barrier_velocity_max" not in bound
 
 
 def test_vertical_load_ratio_is_read_from_the_base_normal_force() -> None:

@@ -251,13 +251,62 @@ def test_calibrate_prints_a_table(run_folder: Path) -> None:
 def test_compare_holds_the_closed_form_against_a_run(run_folder: Path, tmp_path: Path) -> None:
     plot = tmp_path / "fig_14.png"
     found = answer("compare", str(run_folder), "--variant", "stick_slip", "--plot", str(plot))["made_up"]
-    assert list(found) == ["simulated", "stick_slip"]
+    assert list(found) == ["simulated", "stick_slip", "notes"]
+    assert found["notes"] == []
+    assert found["simulated"]["at_least"] == []
     assert found["simulated"]["peak_force"] == pytest.approx(564.76e3 * 0.41 / 0.5, rel=0.03)
     assert found["stick_slip"]["peak_force"] == pytest.approx(564.76e3, rel=1e-4)
     assert_is_picture(plot)
     table = call("compare", str(run_folder), "--lambda", "0.5", "--tau", "0.3").stdout
     assert "simulated" in table
     assert "Δx_f [m]" in table
+    assert "≥" not in table
+
+
+def cut(run_folder: Path, end: float) -> str:
+    """The run folder, its record ended at ``end`` [s]; a summary without T2, as the simulator writes it then."""
+    series = run_folder / "timeseries.csv"
+    header, *rows = series.read_text().splitlines()
+    kept = [row for row in rows if float(row.split(",")[0]) <= end]
+    series.write_text("\n".join([header, *kept]) + "\n")
+    summary = {"peak_force": 1e5, "impact_end_time": None, "impact_duration": None, "barrier_at_rest": False}
+    (run_folder / "summary.json").write_text(json.dumps(summary))
+    return str(run_folder)
+
+
+def test_compare_marks_what_was_not_over_and_compares_nothing_with_it(run_folder: Path, tmp_path: Path) -> None:
+    plot = tmp_path / "fig_14.png"
+    path = cut(run_folder, 1.5)  # the impact ends at 2.3 s, the barrier has its greatest velocity at 1.4 s
+    found = answer("compare", path, "--plot", str(plot))["made_up"]
+    assert found["simulated"]["at_least"] == ["duration", "impulse", "barrier_displacement_final"]
+    assert found["stick_slip"]["at_least"] == []
+    assert len(found["notes"]) == 2
+    assert "the impact is not over at the end of the record" in found["notes"][0]
+    assert "the barrier still moves at 0.532 m/s" in found["notes"][1]
+    assert_is_picture(plot)
+    lines = call("compare", path).stdout.splitlines()
+    header = next(line for line in lines if "T2 [s]" in line)
+    for mark in ("T2 [s]", "J [kN s/m]", "Δx_f [m]"):
+        end = header.index(mark) + len(mark)
+        for line in lines:
+            if "  simulated  " in line:
+                assert "≥" in line[end - 10 : end]
+            if any(f"  {variant}  " in line for variant in ("stick_slip", "as_printed", "calibrated")):
+                assert line[:end].rstrip()[-1].isdigit()  # no difference from a bound
+                assert "%" in line
+    early = answer("compare", cut(run_folder, 1.2))["made_up"]["simulated"]["at_least"]
+    assert early[3:] == ["barrier_velocity_max", "barrier_kinetic_energy_max"]  # while it still gains speed
+
+
+def test_calibrate_says_that_the_impact_was_not_over(run_folder: Path) -> None:
+    assert answer("calibrate", str(run_folder))[0]["notes"] == []
+    path = cut(run_folder, 1.5)
+    for entry in answer("calibrate", path):
+        assert entry["measured"]["at_least"] == ["duration", "impulse"]
+        assert "the impact is not over at the end of the record" in entry["notes"][0]
+    table = call("calibrate", path).stdout
+    assert "made_up: the impact is not over at the end of the record" in table
+    assert "least squares and κ are of the part that was recorded" in table
 
 
 def test_compare_shows_the_variants_of_a_scenario_and_the_pressure_formulas() -> None:
@@ -368,6 +417,62 @@ def test_design_gives_a_trapezoid_that_predict_confirms(tmp_path: Path) -> None:
     assert same["mass"] == pytest.approx(found["mass"])
 
 
+def scenario_with(tmp_path: Path, **barrier: Any) -> str:
+    """Case 1 with other groups in its barrier."""
+    content = json.loads((SCENARIOS / "case_1.json").read_text())
+    content["barrier"] |= barrier
+    content["gravity"]["acceleration_m_per_s2"] = 9.8
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(content))
+    return str(path)
+
+
+def test_design_takes_the_barrier_of_the_scenario_and_says_so(tmp_path: Path) -> None:
+    motion = {"kind": "sliding", "density_kg_per_m3": 2400, "base_friction": 0.29}
+    shape = {"kind": "trapezoid", "base_width_m": 11, "crest_width_m": 4, "height_m": 5}
+    path = scenario_with(tmp_path, motion=motion, shape=shape)
+    found = answer("design", path, "--limit", "1")
+    area = (found["base_width"] + found["crest_width"]) / 2 * 5
+    assert found["height"] == 5
+    assert found["mass"] == pytest.approx(2400 * area)
+    inputs = found["inputs"]
+    assert inputs["barrier_density"] == {"value": 2400, "source": "scenario"}
+    assert inputs["barrier_height"] == {"value": 5, "source": "scenario"}
+    assert inputs["base_friction"] == {"value": 0.29, "source": "scenario"}
+    assert inputs["gravity"] == {"value": 9.8, "source": "scenario"}
+    assert inputs["rise_ratio"] == {"value": 0.35, "source": "assumed"}
+    assert inputs["face_angle"] == {"value": [60, 80], "source": "assumed"}
+    other = answer("design", path, "--limit", "1", "--barrier-density", "2000", "--height", "6", "--gravity", "9.81")
+    assert other["mass"] == pytest.approx(answer("design", *FLOW)["mass"])
+    assert other["inputs"]["barrier_density"] == {"value": 2000, "source": "given"}
+    # A mass in place of the density is spread over the barrier's area; a wall without end has neither.
+    by_mass = scenario_with(tmp_path, motion={"kind": "sliding", "mass_kg_per_m": 9e4, "base_friction": 0.29})
+    assert answer("design", by_mass, "--limit", "1")["inputs"]["barrier_density"]["value"] == pytest.approx(2000)
+    wall = scenario_with(
+        tmp_path,
+        motion={"kind": "sliding", "mass_kg_per_m": 9e4, "base_friction": 0.29},
+        shape={"kind": "wall"},
+    )
+    inputs = answer("design", wall, "--limit", "1")["inputs"]
+    assert inputs["barrier_height"] == {"value": 6, "source": "assumed"}
+    assert inputs["barrier_density"] == {"value": 2000, "source": "assumed"}
+
+
+def test_design_prints_what_it_rests_on() -> None:
+    text = call("design", *FLOW).stdout
+    for line in (
+        "density of the barrier       2000  kg/m³  assumed",
+        "height of the barrier H         6  m      assumed",
+        "base friction tan δ_b        0.29  -      given",
+        "λ                            0.41  -      assumed",
+        "slope of the ground θ           0  °      assumed",
+    ):
+        assert line in text
+    calibrated = answer("design", str(SCENARIOS / "case_4.json"), "--limit", "1", "--calibrated")
+    assert calibrated["inputs"]["geometry_change"]["source"] == "fitted"
+    assert calibrated["inputs"]["geometry_change"]["value"] == calibrated["coefficients"]["geometry_change"]
+
+
 def test_design_with_an_uncertain_speed(tmp_path: Path) -> None:
     uncertain = [*FLOW[:6], "--speed", "lognormal(10, 0.2)", *FLOW[8:], "--samples", "100000"]
     found = answer("design", *uncertain, "--plot", str(tmp_path / "reliability.png"))
@@ -382,6 +487,11 @@ def test_design_with_an_uncertain_speed(tmp_path: Path) -> None:
     assert given["probability"] == pytest.approx(safe["probability"], abs=1e-4)
     table = call("design", *uncertain).stdout
     assert "probability of sliding farther" in table
+    assert "lognormal(10, 0.2)  m/s    given" in table
+    assert "density of the barrier" in table
+    assert given["inputs"]["speed"] == {"value": "lognormal(10, 0.2)", "source": "given"}
+    assert given["inputs"]["barrier_mass"]["source"] == "given"
+    assert "barrier_density" not in given["inputs"]  # of no effect on a given mass
     assert "total Sobol' index" in table
 
 

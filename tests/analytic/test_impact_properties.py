@@ -40,6 +40,12 @@ def impacts(draw: st.DrawFn, **given_inputs: Any) -> Impact:
         "vertical_load_ratio": draw(st.one_of(st.just(0.0), st.floats(0, 0.95 / max(base_friction, 0.3)))),
         "variant": draw(st.sampled_from(["stick_slip", "momentum_closed"])),
         "arrival_time": draw(st.one_of(st.just(0.0), st.floats(0, 100))),
+        # Up to slopes, downhill and uphill, on which the barrier barely rests.
+        "slope": draw(
+            st.one_of(
+                st.just(0.0), st.floats(-0.95, 0.95).map(lambda share: math.degrees(math.atan(share * base_friction)))
+            )
+        ),
     }
     return Impact(**(inputs | given_inputs))
 
@@ -71,16 +77,18 @@ def test_largest_barrier_velocity_is_independent_of_the_rise_ratio(impact: Impac
 
 @given(impacts())
 def test_work_of_the_force_goes_into_friction(impact: Impact) -> None:
-    """Work on the barrier = work of base friction - initial kinetic energy, once it has stopped."""
+    """Work on the barrier = work of base friction - that of its weight along the slope - initial kinetic energy."""
     impact = from_arrival(impact)
     assume(math.isfinite(impact.stop_time))
     work = _work(impact, lambda t: impact.barrier_velocity(t))
     tan = impact.base_friction
-    normal_work = impact.barrier_mass * impact.gravity * impact.barrier_displacement_final
-    dissipated = tan * (normal_work + impact.vertical_load_ratio * work)
+    angle, weight = math.radians(impact.slope), impact.barrier_mass * impact.gravity
+    normal_work = weight * math.cos(angle) * impact.barrier_displacement_final
+    fallen = weight * math.sin(angle) * impact.barrier_displacement_final
+    dissipated = tan * (normal_work + impact.vertical_load_ratio * work) - fallen
     initial = impact.barrier_mass * impact.barrier_initial_velocity**2 / 2
     # Scaled by the energies at play; the difference of two nearly equal ones cannot be more exact than they are.
-    scale = max(dissipated, initial, impact.flow_mass * impact.speed**2 / 2 * 1e-9)
+    scale = max(dissipated + abs(fallen), initial, impact.flow_mass * impact.speed**2 / 2 * 1e-9)
     assert work + initial == pytest.approx(dissipated, abs=1e-7 * scale)
 
 
@@ -117,8 +125,9 @@ def test_momentum_of_the_barrier(impact: Impact) -> None:
         if phase.name == "stick":
             resisted += pushed
         else:
-            weight = impact.barrier_mass * impact.gravity * (until - phase.start)
-            resisted += impact.base_friction * (weight + impact.vertical_load_ratio * pushed)
+            weight, angle = impact.barrier_mass * impact.gravity * (until - phase.start), math.radians(impact.slope)
+            normal = weight * math.cos(angle) + impact.vertical_load_ratio * pushed
+            resisted += impact.base_friction * normal - weight * math.sin(angle)
     gained = impact.barrier_mass * (impact.barrier_velocity(end) - impact.barrier_initial_velocity)
     momentum = impact.impulse + impact.barrier_mass * impact.barrier_initial_velocity
     assert gained == pytest.approx(impact.impulse - resisted, abs=1e-9 * momentum)
@@ -171,10 +180,13 @@ def _integrate(impact: Impact, horizon: float) -> list[tuple[float, float, float
     """
     T1, T2, peak = impact.peak_time, impact.impact_end_time, impact.peak_force
     m1, m2, tan, kappa = impact.flow_mass, impact.barrier_mass, impact.base_friction, impact.vertical_load_ratio
+    angle = math.radians(impact.slope)
     sides = [(0.0, T1, lambda t: peak * t / T1), (T1, T2, lambda t: peak * (T2 - t) / (T2 - T1))][: 1 + (T1 < T2)]
 
+    along, across = m2 * impact.gravity * math.sin(angle), m2 * impact.gravity * math.cos(angle)
+
     def net(force: float) -> float:
-        return force - tan * (m2 * impact.gravity + kappa * force)
+        return force + along - tan * (across + kappa * force)
 
     # Between these kinks the net force keeps its sign, so that a velocity falls through zero at most once.
     pieces = []
@@ -242,7 +254,7 @@ def test_rise_ratio_limits(impact: Impact) -> None:
         assert falling.force(t) == pytest.approx(expected, rel=1e-9)
 
 
-@given(impacts(variant="stick_slip", arrival_time=0.0))
+@given(impacts(variant="stick_slip", arrival_time=0.0, slope=0.0))
 def test_without_base_friction_the_two_bodies_end_with_one_velocity(impact: Impact) -> None:
     smooth = replace(impact, base_friction=0.0)
     end = smooth.impact_end_time
@@ -254,7 +266,7 @@ def test_without_base_friction_the_two_bodies_end_with_one_velocity(impact: Impa
     assert slight.barrier_velocity(end) == pytest.approx(smooth.common_velocity, abs=lost + 1e-9 * impact.speed)
 
 
-@given(impacts(barrier_initial_velocity=0.0, variant="stick_slip"), st.floats(0.01, 0.999999))
+@given(impacts(barrier_initial_velocity=0.0, variant="stick_slip", slope=0.0), st.floats(0.01, 0.999999))
 def test_a_peak_below_the_friction_does_not_move_the_barrier(impact: Impact, share: float) -> None:
     force_on_mass = impact.peak_force / (impact.barrier_mass * impact.gravity)
     held = replace(impact, base_friction=force_on_mass / share, vertical_load_ratio=0.0)
@@ -264,7 +276,7 @@ def test_a_peak_below_the_friction_does_not_move_the_barrier(impact: Impact, sha
     assert {phase.name for phase in held.phases} == {"approach", "stick", "rest"}
 
 
-@given(impacts(variant="as_printed", vertical_load_ratio=0.0, arrival_time=0.0), st.floats(0.0, 0.999))
+@given(impacts(variant="as_printed", vertical_load_ratio=0.0, arrival_time=0.0, slope=0.0), st.floats(0.0, 0.999))
 def test_the_printed_formulas_to_the_letter(impact: Impact, share: float) -> None:
     m1, m2, v10, v20 = impact.flow_mass, impact.barrier_mass, impact.speed, impact.barrier_initial_velocity
     s, g, tan = impact.geometry_change_length, impact.gravity, impact.base_friction

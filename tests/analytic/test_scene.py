@@ -87,8 +87,15 @@ def test_what_the_closed_form_leaves_out_is_said() -> None:
         "flow/velocity_m_per_s": [10, -1],
         "ground/friction": 0.2,
     }
-    assert len(scene_of(scenario(**changes)).remarks) == 3
-    assert scene_of(scenario()).remarks == ()
+    said = scene_of(scenario(**changes))
+    assert len(said.notes) == 3
+    assert said.slope == 5
+    # The flow's weight along the slope is what the closed form leaves out, in kN/m.
+    assert f"{81 * 9.81 * math.sin(math.radians(5)):.3g} kN/m" in said.notes[-1]
+    assert "too small" in said.notes[-1]
+    uphill = scene_of(scenario(**{"gravity/tilt_deg": -5}))
+    assert "too small" not in uphill.notes[0]
+    assert scene_of(scenario()).notes == ()
 
 
 def test_the_base_soil_s_friction_angle_counts_by_four_fifths() -> None:
@@ -96,6 +103,7 @@ def test_the_base_soil_s_friction_angle_counts_by_four_fifths() -> None:
     found = scene_of(scenario(**{"barrier/motion": motion}))
     assert found.base_friction == pytest.approx(0.8 / math.sqrt(3))
     assert found.barrier_mass == 5e4
+    assert found.barrier_density == pytest.approx(2000 * 5e4 / scene_of(scenario()).barrier_mass)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from analytic import fitted, sweep, sweep_fit
 from analytic.arrays import trajectory
 from analytic.cli import app
 from analytic.fitted import CONSTANTS, Constants, calibrated_impact, coefficients
+from analytic.impact import Impact
 from analytic.scene import Scene, read_scene, scene_of
 from warp_mpm.scenario import Scenario
 
@@ -210,7 +211,9 @@ def test_a_table_reads_back(tmp_path: Path) -> None:
         sweep.read_table(tmp_path / "none.csv")
 
 
-def test_a_run_folder_becomes_a_row(tmp_path: Path) -> None:
+@pytest.fixture
+def recorded(tmp_path: Path) -> tuple[Path, Scene, Impact]:
+    """A run folder whose history the closed form made, the scene it shows and the impact."""
     name, content = next((name, content) for name, content in PLAN.items() if not scene_of(content).fixed)
     scene = scene_of(content)
     impact = calibrated_impact(scene, arrival_time=0.2)
@@ -226,6 +229,55 @@ def test_a_run_folder_becomes_a_row(tmp_path: Path) -> None:
     )
     header = "time [s],impact_force_x [N/m],base_normal_force [N/m],barrier_velocity [m/s],barrier_displacement [m]"
     np.savetxt(folder / "timeseries.csv", table, delimiter=",", header=header, comments="")
+    return folder, scene, impact
+
+
+def cut(folder: Path, end: float) -> None:
+    """End the record of a run folder at ``end`` [s]."""
+    header, *rows = (folder / "timeseries.csv").read_text().splitlines()
+    kept = [row for row in rows if float(row.split(",")[0]) <= end]
+    (folder / "timeseries.csv").write_text("\n".join([header, *kept]) + "\n")
+
+
+def test_a_record_that_ends_before_the_impact_is_left_out(recorded: tuple[Path, Scene, Impact], tmp_path: Path) -> None:
+    folder, _, impact = recorded
+    cut(folder, impact.arrival_time + 0.6 * impact.duration)
+    with pytest.raises(ValueError, match=rf"{folder.name}: the impact is not over at the end of the record"):
+        sweep.collect(folder)
+    found = CliRunner().invoke(app, ["sweep", "collect", str(folder), "--out", str(tmp_path / "table.csv")])
+    assert found.exit_code == 2
+    assert f"Left out: {folder}: the impact is not over" in found.stderr
+
+
+def test_a_barrier_that_still_moves_is_marked_and_not_fitted(
+    recorded: tuple[Path, Scene, Impact], tmp_path: Path
+) -> None:
+    folder, _, _ = recorded
+    series = folder / "timeseries.csv"
+    header, *rows = series.read_text().splitlines()
+    last = rows[-1].split(",")
+    last[3] = "0.1"  # its velocity
+    series.write_text("\n".join([header, *rows[:-1], ",".join(last)]) + "\n")
+    table = tmp_path / "table.csv"
+    found = CliRunner().invoke(app, ["sweep", "collect", str(folder), "--out", str(table)])
+    assert found.exit_code == 0
+    assert f"Not at rest: {folder.name}" in found.stderr
+    (run,) = sweep.read_table(table)
+    assert not run.at_rest
+    assert sweep_fit.usable([run], fixed=False) == []
+
+
+def test_a_run_on_a_slope_is_left_out(recorded: tuple[Path, Scene, Impact]) -> None:
+    folder, _, _ = recorded
+    content = json.loads((folder / "scenario.json").read_text())
+    content["gravity"]["tilt_deg"] = 3
+    (folder / "scenario.json").write_text(json.dumps(content))
+    with pytest.raises(ValueError, match=r"gravity\.tilt_deg is 3, a sweep is of level ground"):
+        sweep.collect(folder)
+
+
+def test_a_run_folder_becomes_a_row(recorded: tuple[Path, Scene, Impact]) -> None:
+    folder, scene, impact = recorded
     run = sweep.collect(folder)
     assert run.vertical_load_ratio == pytest.approx(impact.vertical_load_ratio, rel=1e-6)
     assert run.barrier_displacement_final == pytest.approx(impact.barrier_displacement_final, rel=1e-6)

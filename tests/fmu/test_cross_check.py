@@ -32,7 +32,7 @@ SLIDING = {
     "set_i": ((0.167, -0.572, 0.006, -0.473), (-0.254, -0.563, 0.292), 0.07),
     "set_iia": ((0.537, -0.360, 0.757, 0.149), (0.264, -0.058, 0.133), 0.08),
     "set_iib": ((0.682, -0.134, 0.767, 0.454), (0.440, 0.290, 0.069), 0.08),
-    "set_iii": ((0.047, -0.596, -0.339, -0.674), (-0.426, -0.682, 0.383), 0.09),
+    "set_iii": ((0.047, -0.610, -0.339, -0.674), (-0.426, -0.682, 0.332), 0.09),
     "set_iv": ((-0.193, -0.556, -0.333, -0.714), (-0.060, -0.557, 0.208), 0.12),
     "set_v": ((0.230, -0.544, 0.448, -0.215), (0.065, -0.371, 0.226), 0.09),
 }
@@ -42,7 +42,7 @@ FIXED = {
     "set_i": ((0.295, -0.119), (0.0, 0.067), 0.06),
     "set_iia": ((0.532, 0.203), (0.105, 0.119), 0.06),
     "set_iib": ((0.635, 0.695), (0.176, 0.144), 0.05),
-    "set_iii": ((0.219, -0.094), (0.0, 0.130), 0.06),
+    "set_iii": ((0.219, -0.100), (0.0, 0.113), 0.06),
     "set_iv": ((-0.213, -0.198), (0.0, 0.116), 0.07),
     "set_v": ((0.252, -0.097), (0.0, 0.095), 0.06),
 }
@@ -55,6 +55,8 @@ def compare(archives: dict[str, Path]):
     @cache
     def run(name: str) -> CrossCheck:
         scenario = Scenario.load(ROOT / "scenarios" / f"{name}.json").replaced({"numerics.spacing_m": SPACING})
+        if name.startswith("set_iii"):  # the longest flow, whose impact is not over after the 6 s of the scenario
+            scenario = scenario.replaced({"output.end_time_s": 8.0})
         return cross_check(scenario, archives["BarrierSliding"])
 
     return run
@@ -107,6 +109,22 @@ def test_fixed_barrier_stays_within_the_bands(name: str, compare) -> None:
     assert calibrated.figures["barrier_displacement_final"] == 0.0
 
 
+def test_unit_moves_as_the_simulation_on_a_slope(archives: dict[str, Path]) -> None:
+    """Slope and ground friction; the vertical load on the base is multiplied by tan(delta_b), not by what is left."""
+    changes = {"gravity.tilt_deg": 5.0, "ground.friction": 0.3, "output.end_time_s": 6.0, "numerics.spacing_m": 1.0}
+    scenario = Scenario.load(ROOT / "scenarios" / "case_1.json").replaced(changes)
+    found = cross_check(scenario, archives["BarrierSliding"])
+    under_simulated_force = found.comparisons[-1]
+    assert found.figures["barrier_displacement_final"] > 2
+    assert under_simulated_force.root_mean_squares["barrier_velocity"] < 1e-3
+    assert under_simulated_force.root_mean_squares["barrier_displacement"] < 1e-3
+    paper = found.comparisons[0].figures["barrier_displacement_final"]
+    assert paper == pytest.approx(found.scene.impact().barrier_displacement_final, rel=1e-6)
+    assert any("the flow's is left out" in note for note in found.notes)
+    with pytest.raises(ValueError, match="on a slope of 17 degrees it must be above"):
+        cross_check(scenario.replaced({"gravity.tilt_deg": 17.0}), archives["BarrierSliding"])
+
+
 def run_command(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "fmu", *map(str, arguments)],
@@ -129,12 +147,28 @@ def test_command_compares_a_scenario(tmp_path: Path) -> None:
         "simulated force",
     ]
     assert content["simulation"]["peak_force"] > 1e5
+    assert content["at_least"] == []
+    assert content["notes"] == []
     assert (tmp_path / "set_v.png").stat().st_size > 10_000
     table = (tmp_path / "set_v.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines() if line.startswith("|")]
     assert rows[0][:2] == ["", "peak force [kN/m]"]
     assert [row[0] for row in rows[2:]] == ["simulation", *(f"unit, {unit['name']}" for unit in content["units"])]
     assert float(rows[2][1]) == pytest.approx(content["simulation"]["peak_force"] / 1e3, rel=1e-3)
+
+
+def test_command_compares_nothing_with_what_was_not_over(tmp_path: Path) -> None:
+    arguments = ("check", "scenarios/case_1.json", "--spacing", 1.0, "--until", 1.2, "--out", tmp_path)
+    (content,) = json.loads(run_command(*arguments, "--json").stdout)
+    bounds = ["impulse", "barrier_displacement_final", "barrier_velocity_max"]
+    assert content["at_least"] == bounds
+    for unit in content["units"]:
+        assert [unit["errors"][name] for name in bounds] == [None] * 3
+        assert unit["errors"]["peak_force"] is not None
+    table = run_command(*arguments).stdout
+    assert table.count("≥ ") == 3
+    assert "≥: the impact is not over at the end of the record" in table
+    assert "≥: the barrier still moves at" in table
 
 
 def test_command_builds_and_proves(tmp_path: Path) -> None:
