@@ -68,10 +68,10 @@ class Constants:
 
 CONSTANTS = {
     "sliding": Constants(
-        jet=1.286, weight=1.112, mass_exponent=0.312, rise=0.225, rise_length_exponent=0.668, rise_angle_exponent=-1.157
+        jet=1.286, weight=1.108, mass_exponent=0.312, rise=0.237, rise_length_exponent=0.648, rise_angle_exponent=-1.108
     ),
     "fixed": Constants(
-        jet=1.231, weight=0.817, mass_exponent=0.000, rise=0.215, rise_length_exponent=0.633, rise_angle_exponent=-1.536
+        jet=1.228, weight=0.812, mass_exponent=0.000, rise=0.220, rise_length_exponent=0.595, rise_angle_exponent=-1.558
     ),
 }
 """Fitted by ``python -m analytic sweep fit docs/data/sweep.csv``."""
