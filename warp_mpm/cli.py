@@ -16,7 +16,7 @@ import typer
 from analytic.command_line import BAD_INPUT, complain
 from warp_mpm.commands import register
 from warp_mpm.commands.check import check
-from warp_mpm.commands.refusals import ScenarioCommandLine, with_options
+from warp_mpm.commands.refusals import ScenarioCommandLine, refusals, with_options
 
 if TYPE_CHECKING:
     from warp_mpm.scenario import Scenario
@@ -175,16 +175,17 @@ def run(
             f"is mended: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(BAD_INPUT) from None
-    if report:
-        from warp_mpm.report import write_report
-        from warp_mpm.results import Results
-
-        write_report([Results.open(folder)], folder / "report.html")
     if as_json:
         typer.echo(json.dumps(outcome.summary, indent=2, ensure_ascii=False))
     else:
         display.summarize(outcome)
-        if report and not quiet:
+    if report:
+        from warp_mpm.report import write_report
+        from warp_mpm.results import Results
+
+        with refusals():
+            write_report([Results.open(folder)], folder / "report.html")
+        if not quiet and not as_json:
             typer.echo(f"The report is {folder / 'report.html'}")
     if ended_before and not quiet:
         typer.echo(f"The run in {folder} had finished before; nothing was left to simulate.", err=True)

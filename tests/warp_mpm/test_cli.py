@@ -1,5 +1,6 @@
 """The command line, with a stand-in for the simulation: output, exit codes, and what it refuses."""
 
+import errno
 import json
 import os
 import signal
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import warp_mpm.simulation
+from analytic.whole_file import UnwrittenError
 from warp_mpm.cli import BAD_INPUT, DIVERGED, INTERRUPTED, app
 from warp_mpm.commands.check import described
 from warp_mpm.recording import run_folder
@@ -69,6 +71,17 @@ def test_quiet_run_says_nothing(command):
     result = run(command, "--quiet", "--out", "here")
     assert (result.exit_code, result.output) == (0, "")
     assert (Path("here") / run_folder.SUMMARY).is_file()
+
+
+def test_a_report_that_cannot_be_written_costs_no_result(command, monkeypatch):
+    def write_report(results, target):
+        raise UnwrittenError(errno.ENOSPC, "No space left on device", str(target))
+
+    monkeypatch.setattr("warp_mpm.report.write_report", write_report)
+    result = run(command, "--out", "here", "--report")
+    assert result.exit_code == BAD_INPUT
+    assert "peak force" in result.stdout
+    assert result.stderr.strip().endswith("here/report.html cannot be written: No space left on device.")
 
 
 def test_an_existing_run_needs_force(command):
