@@ -21,26 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.arrays import trajectory
+from analytic.force_record import (
+    FILTER_WINDOW,
+    START_SHARE,
+    cumulative_impulse,
+    impact_end,
+    moving_mean,
+)
 from analytic.impact import Impact
 from analytic.scene import Scene
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-FILTER_WINDOW = 0.05
-"""Length of the moving mean [s]; the simulator's own summary uses the same."""
-
-START_SHARE = 0.01
-"""Share of the peak force at which the impact starts."""
-
-END_SHARE = 0.1
-"""Share of the peak's height over the residual force at which the impact is over."""
-
-SETTLED_SHARE = 0.05
-"""Share of the peak force below which a residual force has settled, however it changes."""
-
-RESIDUAL_SHARE = 0.1
-"""Last share of the record over which the residual force is taken."""
 
 RULES = ("peak", "least_squares")
 
@@ -131,42 +123,17 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
     first = int(np.argmax(force > START_SHARE * force.max()))
     arrival = float(time[max(first - 1, 0)])
     impulse = cumulative_impulse(time, force)
-    tenth = RESIDUAL_SHARE * float(time[-1] - time[0])
-    tail = float(time[-1]) - tenth
-    before, at_tail = np.interp([tail - tenth, tail], time, impulse)
-    last = float(impulse[-1] - at_tail) / tenth
-    # A force that still falls has another residual the longer the record, and with it another end.
-    to_come = abs(last - float(at_tail - before) / tenth) / tenth * (float(time[-1]) - arrival)
-    settled = last <= SETTLED_SHARE * filtered[peak] or to_come <= END_SHARE * filtered[peak]
-    residual = max(last, 0.0)
-    threshold = residual + END_SHARE * (filtered[peak] - residual)
-    above = np.flatnonzero(filtered[peak:] >= threshold)
-    end = peak + int(above[-1]) + 1
-    end_time = float(time[min(end, len(time) - 1)])
+    end = impact_end(time, force, filtered, arrival)
     return Measured(
         arrival_time=arrival,
         peak_force=float(filtered[peak]),
         peak_time=float(time[peak]),
-        end_time=end_time,
-        over=end_time <= tail and bool(settled),
-        impulse=float(np.interp(end_time, time, impulse) - np.interp(arrival, time, impulse)),
-        residual_force=residual,
+        end_time=end.time,
+        over=end.over,
+        impulse=float(np.interp(end.time, time, impulse) - np.interp(arrival, time, impulse)),
+        residual_force=max(end.residual_force, 0.0),
         filter_window=filter_window,
     )
-
-
-def cumulative_impulse(time: Array, force: Array) -> Array:
-    """Impulse since the first time [N s/m] of a force given as means over the intervals that end at ``time``."""
-    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])
-
-
-def moving_mean(time: Array, force: Array, window: float) -> Array:
-    """Mean of the force over ``window`` [s] around the middle of each interval; shorter at the ends of the record."""
-    if window == 0:
-        return force
-    impulse = cumulative_impulse(time, force)
-    low, high = np.maximum(time - window / 2, time[0]), np.minimum(time + window / 2, time[-1])
-    return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
 
 
 # --- the two rules ---------------------------------------------------------------------------------------------------

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analytic.arrays import Trajectory, trajectory
-from analytic.calibration import Calibration, KeyFigures, moving_mean
+from analytic.calibration import Calibration, KeyFigures
 from analytic.field_data import SYNTHETIC, Agreement, Events
+from analytic.force_record import moving_mean
 from analytic.impact import Impact
 from analytic.reliability import Reliability
 from analytic.sweep import Run

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from analytic.calibration import FILTER_WINDOW, moving_mean
+from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.plots import BLUE, GREEN, GREY, ORANGE, SKY
 from fmu.cross_check import Array, CrossCheck, Trajectory
 

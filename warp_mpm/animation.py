@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.whole_file import whole_file
 from warp_mpm.fields import Field, colour_limits, field_named
 from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, in_lines, shown, window
 from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading
 from warp_mpm.results import Results, ResultsError
-from warp_mpm.summary import FILTER_WINDOW, moving_mean
 
 FORMATS = ("mp4", "gif")
 SLOWEST, FASTEST = 2.0, 50.0

@@ -8,27 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.force_record import (
+    END_SHARE,
+    FILTER_WINDOW,
+    RESIDUAL_SHARE,
+    SETTLED_SHARE,
+    START_SHARE,
+    cumulative_impulse,
+    impact_end,
+    moving_mean,
+)
 from warp_mpm import mechanism
 from warp_mpm.results import Snapshots
 from warp_mpm.scenario import Scenario, Sliding
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
-
-FILTER_WINDOW = 0.05
-"""Length [s] of the moving mean of the filtered force."""
-
-START_SHARE = 0.01
-"""Share of the peak force at which the impact starts."""
-
-END_SHARE = 0.1
-"""Share of the peak's height over the residual force at which the impact is over."""
-
-RESIDUAL_SHARE = 0.1
-"""Last share of the run over which the residual force is taken."""
-
-SETTLED_SHARE = 0.05
-"""Share of the peak force below which a residual force has settled, however it changes."""
 
 DEFINITIONS = {
     "peak_force": "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
@@ -132,35 +127,13 @@ def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
         "impact_start_time": start,
         "rise_time": float(time[filtered_peak]) - start,
     }
-    tenth = RESIDUAL_SHARE * float(time[-1] - time[0])
-    tail = float(time[-1]) - tenth
-    before, at_tail = np.interp([tail - tenth, tail], time, impulse)
-    residual = float(impulse[-1] - at_tail) / tenth
-    figures["residual_force"] = residual
-    # A force that still falls has another residual the longer the run, and with it another end.
-    to_come = abs(residual - float(at_tail - before) / tenth) / tenth * (float(time[-1]) - start)
-    if residual > SETTLED_SHARE * filtered[filtered_peak] and to_come > END_SHARE * filtered[filtered_peak]:
-        return figures
-    above = np.flatnonzero(filtered - residual >= END_SHARE * (filtered[filtered_peak] - residual))
-    if len(above) > 0 and above[-1] + 1 < len(time) and time[above[-1] + 1] <= tail:
-        end = float(time[above[-1] + 1])
-        figures["impact_end_time"] = end
-        figures["impact_duration"] = end - start
-        figures["impact_impulse"] = float(np.interp(end, time, impulse) - np.interp(start, time, impulse))
+    end = impact_end(time, force, filtered, start)
+    figures["residual_force"] = end.residual_force
+    if end.over:
+        figures["impact_end_time"] = end.time
+        figures["impact_duration"] = end.time - start
+        figures["impact_impulse"] = float(np.interp(end.time, time, impulse) - np.interp(start, time, impulse))
     return figures
-
-
-def cumulative_impulse(time: Array, force: Array) -> Array:
-    """Impulse [N s/m] from the start to each time, of forces that are means over the interval before it."""
-    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])
-
-
-def moving_mean(time: Array, force: Array, window: float = FILTER_WINDOW) -> Array:
-    """Mean force [N/m] over `window` seconds around each time, over what there is of it at the ends of the run."""
-    impulse = cumulative_impulse(time, force)
-    low = np.maximum(time - 0.5 * window, time[0])
-    high = np.minimum(time + 0.5 * window, time[-1])
-    return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
 
 
 def mass_error(series: Series) -> float | None:

@@ -9,6 +9,7 @@ import pytest
 from analytic import calibration
 from analytic.arrays import trajectory
 from analytic.calibration import CalibrationError, calibrate, measure, misfit
+from analytic.force_record import FILTER_WINDOW, SETTLED_SHARE
 from analytic.impact import Impact
 from analytic.scene import Scene
 from analytic.time_series import TimeSeriesError, read_time_series
@@ -47,7 +48,7 @@ def test_both_rules_find_the_numbers_that_made_the_record(
     series = record(impact)
     peak = calibrate(series["time"], series["impact_force_x"], scene)
     # A moving mean of width w takes w / 4 times the mean slope off a triangle's tip, and blurs its time by w / 2.
-    window = calibration.FILTER_WINDOW
+    window = FILTER_WINDOW
     cut = window / 4 * (1 / rise_ratio + 1 / (1 - rise_ratio)) / impact.duration / 2
     assert peak.geometry_change == pytest.approx(geometry_change, rel=1.2 * cut)
     assert peak.geometry_change > geometry_change
@@ -130,7 +131,7 @@ def test_a_surge_at_the_end_of_the_record_is_not_the_end_of_the_impact() -> None
     series = record(SLIDING.impact(geometry_change=0.41, rise_ratio=0.35))
     force = series["impact_force_x"] + 1e5 * (series["time"] > 4.9)
     found = measure(series["time"], force)
-    assert found.residual_force < calibration.SETTLED_SHARE * found.peak_force
+    assert found.residual_force < SETTLED_SHARE * found.peak_force
     assert not found.over
 
 

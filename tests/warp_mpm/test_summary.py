@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
+from analytic.force_record import FILTER_WINDOW, moving_mean
 from warp_mpm import mechanism
 from warp_mpm.results import Snapshot
 from warp_mpm.summary import (
     DEFINITIONS,
-    FILTER_WINDOW,
     energy_error,
     impact_figures,
     mass_error,
     momentum_error,
-    moving_mean,
 )
 
 

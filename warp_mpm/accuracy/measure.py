@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from analytic.force_record import moving_mean
 from warp_mpm import mechanism
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import Scenario
-from warp_mpm.summary import impact_figures, moving_mean
+from warp_mpm.summary import impact_figures
 
 CURVES = ("impact_force_x", "flow_kinetic_energy", "barrier_displacement")
 """Columns of the time series that are kept."""

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from analytic.force_record import cumulative_impulse
 from analytic.whole_file import write_whole
 from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder, scene_key
 from warp_mpm.results import Results
 from warp_mpm.scenario import Scenario, Trapezoid
-from warp_mpm.summary import cumulative_impulse
 
 DATA = "paper_scenes.json"
 """Ladders of the paper's scenes, beside this file."""

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from analytic.force_record import FILTER_WINDOW, moving_mean
 from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid, heading
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Fixed
-from warp_mpm.summary import FILTER_WINDOW, moving_mean
 
 GOING = {"sliding": "sliding", "prescribed": "driven"}
 """What a barrier of each kind of motion does where it has not come to rest."""

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from analytic.arrays import trajectory
 from analytic.calibration import RULES, Calibration, CalibrationError, calibrate, misfit
+from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.scene import SceneError, scene_of
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.effect_rules import effect_rules
 from warp_mpm.results import Results
 from warp_mpm.scenario import Trapezoid, Wall
-from warp_mpm.summary import FILTER_WINDOW, moving_mean
 from warp_mpm.terminal import described, summary_rows
 
 Array = NDArray[np.float64]

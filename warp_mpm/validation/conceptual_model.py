@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
+from analytic.force_record import moving_mean
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import Sliding, Trapezoid
-from warp_mpm.summary import moving_mean
 from warp_mpm.validation.case import Array
 from warp_mpm.validation.paper_runs import PaperRun
 

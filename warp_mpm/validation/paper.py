@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from analytic.force_record import moving_mean
 from warp_mpm.accuracy.errors import Reference, extrapolate
 from warp_mpm.plotting import pore_pressure
-from warp_mpm.summary import moving_mean
 from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, Table, holds, reported
 from warp_mpm.validation.conceptual_model import conceptual_forces
 from warp_mpm.validation.paper_runs import TITLES, PaperRun, force_history, paper_runs, paper_scene

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from analytic.force_record import cumulative_impulse, moving_mean
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
-from warp_mpm.summary import cumulative_impulse, moving_mean
 from warp_mpm.validation.case import Array
 
 SCENES = Path(__file__).parents[2] / "scenarios"
