@@ -15,9 +15,10 @@ from rich.table import Table
 from rich.text import Text
 
 from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
+from warp_mpm.description import described
 from warp_mpm.results import Results
 from warp_mpm.run import RunOutcome, RunProgress
-from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Sliding
+from warp_mpm.scenario import Scenario
 
 REFRESH = 0.1
 """Least time [s] between two states of the bar: a run has hundreds of records a second."""
@@ -63,7 +64,8 @@ class RunDisplay:
 
     def __enter__(self) -> Self:
         self._console.print(self._scenario.title, style="bold")
-        self._console.print(f"{described(self._scenario)}; {self._device}", soft_wrap=True)
+        flow, rest = described(self._scenario)
+        self._console.print(f"{flow}\n{rest}; {self._device}", soft_wrap=True)
         for sentence in scene_caveats(self._scenario):
             self._console.print(f"Note: {sentence}", soft_wrap=True)
         if self._console.is_terminal and not self._console.quiet:
@@ -109,24 +111,6 @@ class RunDisplay:
         for sentence in run_caveats(Results.open(outcome.path).record, outcome.summary):
             self._console.print(f"Note: {sentence}", soft_wrap=True)
         self._console.print(f"Results are in {outcome.path}", soft_wrap=True)
-
-
-def described(scenario: Scenario) -> str:
-    """One line on what a scenario asks for."""
-    flow, numerics = scenario.flow, scenario.numerics
-    points = flow.volume / numerics.spacing_m**2 * numerics.points_per_cell
-    parts = [
-        f"{flow.formulation.replace('_', '-')} flow of {flow.volume:g} m³/m, {flow.depth:g} m deep, "
-        f"{flow.volume * flow.material.density:,.0f} kg/m",
-        f"Fr {flow.speed / math.sqrt(STANDARD_GRAVITY * flow.depth):.2f}",
-    ]
-    if scenario.barrier is not None:
-        motion: str = scenario.barrier.motion.kind
-        if isinstance(scenario.barrier.motion, Sliding):
-            motion += f", {scenario.barrier.mass:,.0f} kg/m"
-        parts.append(f"barrier {motion}")
-    parts.append(f"about {points:,.0f} points on a {numerics.spacing_m:g} m grid, {numerics.precision}")
-    return "; ".join(parts)
 
 
 def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:

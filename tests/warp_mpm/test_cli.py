@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import warp_mpm.simulation
 from analytic.whole_file import UnwrittenError
 from warp_mpm.cli import BAD_INPUT, DIVERGED, INTERRUPTED, app
-from warp_mpm.commands.check import described
+from warp_mpm.description import described
 from warp_mpm.recording import run_folder
 from warp_mpm.results import Results
 from warp_mpm.scenario import Scenario
@@ -233,7 +233,7 @@ def test_check_tells_what_a_scene_is(command):
         "  barrier H = 6 m, β = 59.7°, 90,000 kg/m, sliding with tan δ_b = 0.29; ends at 6 s; "
         "about 4,800 points on a 0.2 m grid, float64",
     ]
-    told = {file.stem: described(Scenario.load(file))[1:] for file in SCENES.glob("case_*.json")}
+    told = {file.stem: described(Scenario.load(file)) for file in SCENES.glob("case_*.json")}
     assert told["case_1"] != told["case_3"]  # 60° and 80°
     assert "β = 59.7°, fixed" in told["case_1_fixed"][1]
     assert told["case_5"][1].startswith("barrier: wall without end, fixed")

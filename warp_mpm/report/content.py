@@ -13,10 +13,11 @@ from analytic.calibration import RULES, Calibration, CalibrationError, calibrate
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.scene import SceneError, scene_of
 from warp_mpm.caveats import run_caveats, scene_caveats
+from warp_mpm.description import described
 from warp_mpm.effect_rules import effect_rules
 from warp_mpm.results import Results
 from warp_mpm.scenario import Trapezoid, Wall
-from warp_mpm.terminal import described, summary_rows
+from warp_mpm.terminal import summary_rows
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
     return {
         "name": name,
         "title": scenario.title,
-        "description": described(scenario),
+        "description": "; ".join(described(scenario)),
         "source": scenario.source,
         "status": record.get("status"),
         "end": float(series["time"][-1]),

@@ -1,0 +1,36 @@
+"""A scene in a few words."""
+
+from __future__ import annotations
+
+from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
+
+
+def described(scenario: Scenario) -> list[str]:
+    """A scene in two lines: flow and ground; barrier and run."""
+    flow, numerics, ground, tilt = scenario.flow, scenario.numerics, scenario.ground, scenario.gravity.tilt_deg
+    speed = f"v = {flow.speed:.4g} m/s"
+    if scenario.gravity.acceleration_m_per_s2 > 0.0:
+        speed += f" (Fr {flow.speed / (scenario.gravity.acceleration_m_per_s2 * flow.depth) ** 0.5:.2f})"
+    slope = "no ground" if ground is None else f"slope {tilt:g}°, ground friction {ground.friction:g}"
+    material = flow.formulation.replace("_", "-")
+    points = flow.volume / numerics.spacing_m**2 * numerics.points_per_cell
+    return [
+        f"{material} flow of {flow.volume:g} m³/m, {flow.volume * flow.material.density:,.0f} kg/m, "
+        f"{flow.depth:g} m deep, {speed}; {slope}",
+        f"{_barrier(scenario.barrier)}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
+        f"{numerics.spacing_m:g} m grid, {numerics.precision}",
+    ]
+
+
+def _barrier(barrier: Barrier | None) -> str:
+    if barrier is None:
+        return "no barrier"
+    words = "barrier: wall without end"
+    if isinstance(barrier.shape, Trapezoid):
+        _, _, height = barrier.shape.base_crest_height
+        words = f"barrier H = {height:.4g} m, β = {barrier.shape.built_face_angle_deg:.3g}°"
+    if isinstance(barrier.motion, Sliding):
+        return (
+            f"{words}, {barrier.mass:,.0f} kg/m, sliding with tan δ_b = {barrier.motion.base_friction_coefficient:.3g}"
+        )
+    return f"{words}, {'driven' if isinstance(barrier.motion, Prescribed) else 'fixed'}"
