@@ -283,14 +283,21 @@ def design_chart(
     )
     figure.colorbar(shades, ax=axis, label="final displacement [m]", ticks=levels)
     lines = axis.contour(mass_ratio, speed, moved, levels=levels[1:], colors="black", linewidths=0.5)
-    axis.clabel(lines, fmt=lambda value: f"{value:g} m", fontsize=8)
+    # Each label on its line, away from the frame and from its neighbours'; the limit has its own in the legend.
+    labels: list[tuple[float, float]] = []
+    for index, (level, path) in enumerate(zip(levels[1:], lines.get_paths(), strict=True)):
+        points = np.asarray(path.vertices)
+        if len(points) > 0 and level != limit:
+            x, y = points[round((0.35 if index % 2 else 0.65) * (len(points) - 1))]
+            labels.append((float(x), float(y)))
+    axis.clabel(lines, fmt=lambda value: f"{value:g} m", fontsize=8, manual=labels)
     if limit > 0:
         axis.contour(mass_ratio, speed, moved, levels=[limit], colors=BLUE, linewidths=2.2)
         axis.plot([], [], color=BLUE, linewidth=2.2, label=f"limit, {limit:g} m")
     axis.plot(*point, "o", color=BLUE, markeredgecolor="white", markersize=9, label="lightest barrier")
     axis.set_xlabel("mass ratio $m_2 / m_1$ [-]")
     axis.set_ylabel("flow velocity $v_{1,0}$ [m/s]")
-    axis.legend(fontsize=9, loc="upper right")
+    axis.legend(fontsize=9, loc="lower right")
     return figure
 
 

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 FOLDS = 5
 
+RESAMPLES = 200
+"""Times that the runs are drawn anew for the standard errors of the constants."""
+
 ROBUST_SCALE = 0.1
 """Residual [-] beyond which a run's weight falls."""
 
@@ -117,6 +120,22 @@ def fit(runs: Sequence[Run]) -> Constants:
         rise_length_exponent=float(by_length),
         rise_angle_exponent=float(by_angle),
     )
+
+
+def standard_errors(runs: Sequence[Run], seed: int = 1) -> Constants:
+    """The standard error of each constant, by the bootstrap: its spread over fits to as many runs, drawn anew."""
+    random = np.random.default_rng(seed)
+    draws = random.integers(len(runs), size=(RESAMPLES, len(runs)))
+    found = [list(vars(fit([runs[index] for index in draw])).values()) for draw in draws]
+    spread = np.std(found, axis=0, ddof=1)
+    return Constants(**{name: float(value) for name, value in zip(vars(fit(runs)), spread, strict=True)})
+
+
+def vertical_load_scatter(runs: Sequence[Run]) -> tuple[float, float]:
+    """Root mean square of the recorded kappa about cot(beta), and their own spread [-]; of sliding barriers."""
+    kappa = np.array([run.vertical_load_ratio for run in runs])
+    rule = np.array([1 / math.tan(math.radians(run.face_angle)) for run in runs])
+    return float(np.sqrt(np.mean((kappa - rule) ** 2))), float(np.std(kappa))
 
 
 def cross_validated(runs: Sequence[Run], seed: int = 1) -> list[Coefficients]:

@@ -39,7 +39,8 @@ def cross_check_figure(check: CrossCheck) -> Figure:
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
         axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
-    axes[-1].legend(frameon=False)
+    handles = {label: line for axis in axes for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(check.simulated.time[0], check.simulated.time[-1])
     return figure

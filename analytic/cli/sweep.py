@@ -22,7 +22,7 @@ def plan(
 ) -> None:
     """Write scenario files spread over speed, depth, length, porosity, face angle, height, mass and base friction.
 
-    Run each with: python -m warp_mpm run sweep/scene_000.json --out sweep/runs/scene_000
+    Run them with: python -m warp_mpm run sweep/*.json --out sweep/runs
     """
     with refusals():
         from analytic import sweep as scenes
@@ -76,7 +76,7 @@ def fit(
     as_json: AsJson = False,
     plot: Plot = None,
 ) -> None:
-    """Fit the constants and say how well they predict scenes they were not fitted to."""
+    """Fit the constants, say how sure they are and how well they predict scenes they were not fitted to."""
     with refusals():
         from analytic import sweep as scenes
         from analytic import sweep_fit
@@ -84,7 +84,7 @@ def fit(
         check_plot(plot)
         runs = scenes.read_table(table)
         content: dict[str, Any] = {}
-        rows, drawn, papers, held_out = [], [], [], []
+        rows, constant_rows, drawn, papers, held_out = [], [], [], [], []
         for kind, fixed in (("sliding", False), ("fixed", True)):
             usable = sweep_fit.usable(runs, fixed)
             if len(usable) < 4 * sweep_fit.FOLDS:
@@ -94,8 +94,20 @@ def fit(
             drawn += usable
             papers += [run.scene.impact(**numbers.model) for run, numbers in zip(usable, paper, strict=True)]
             held_out += [run.scene.impact(**numbers.model) for run, numbers in zip(usable, calibrated, strict=True)]
-            constants = sweep_fit.fit(usable)
-            content[kind] = {"constants": vars(constants), "paper": vars(before), "calibrated": vars(after)}
+            constants, errors = vars(sweep_fit.fit(usable)), vars(sweep_fit.standard_errors(usable))
+            content[kind] = {
+                "constants": constants,
+                "standard_errors": errors,
+                "paper": vars(before),
+                "calibrated": vars(after),
+            }
+            if not fixed:
+                scatter, spread = sweep_fit.vertical_load_scatter(usable)
+                content[kind]["vertical_load"] = {"scatter": scatter, "spread": spread}
+            constant_rows += [
+                [kind, *(_constant(name, value, ".3f", fixed) for name, value in constants.items())],
+                ["±", *(_constant(name, value, ".2f", fixed) for name, value in errors.items())],
+            ]
             rows += [_row(f"{kind}, paper's constants", before), _row(f"{kind}, calibrated", after)]
         if plot is not None:
             rules = {"paper's constants": papers, "calibrated, held out": held_out}
@@ -118,15 +130,23 @@ def fit(
         notes = [
             "Medians; the calibrated ones by five-fold cross-validation, each run with constants fitted without it.",
             "Δx: of the barriers that moved by a tenth of the depth; spread: exp of the root mean square log ratio.",
-            *(f"{kind}: {found['constants']}" for kind, found in content.items()),
         ]
         print_table("Closed form against simulations", header, rows, notes)
+        notes = [
+            f"±: standard errors, by drawing the runs anew {sweep_fit.RESAMPLES} times.",
+            f"κ = cot β is not fitted: recorded κ scatter about it by {scatter:.2f}, their own spread is {spread:.2f}.",
+        ]
+        print_table("Constants", ["", "a", "b", "c", "t", "p", "q"], constant_rows, notes)
 
 
 def _figure(runs: Any, rules: Any) -> Any:
     from analytic import plots
 
     return plots.sweep(runs, rules)
+
+
+def _constant(name: str, value: float, form: str, fixed: bool) -> str:
+    return "–" if fixed and name == "mass_exponent" else format(value, form)
 
 
 def _row(name: str, found: Any) -> list[str]:

@@ -175,6 +175,36 @@ def test_the_fit_finds_the_constants_that_made_the_table(fixed: bool, constants:
         assert paper.displacement_factor > 1.5
 
 
+def test_standard_errors_are_those_of_linear_least_squares() -> None:
+    """The rise time is fitted linearly in its logarithm, where the standard errors are known."""
+    random, noise = np.random.default_rng(1), 0.2
+    runs = [
+        replace(run, rise_time=run.rise_time * math.exp(random.normal(0, noise)))
+        for run in sweep_fit.usable(MADE_UP, fixed=False)
+    ]
+    columns = [
+        (1.0, math.log(run.flow_length / run.flow_height), math.log(1 - math.cos(math.radians(run.face_angle))))
+        for run in runs
+    ]
+    matrix = np.array(columns)
+    expected = noise * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
+    found = sweep_fit.standard_errors(runs)
+    assert found.rise == pytest.approx(sweep_fit.fit(runs).rise * expected[0], rel=0.3)
+    assert found.rise_length_exponent == pytest.approx(expected[1], rel=0.3)
+    assert found.rise_angle_exponent == pytest.approx(expected[2], rel=0.3)
+    assert found == sweep_fit.standard_errors(runs)
+    assert sweep_fit.standard_errors(sweep_fit.usable(MADE_UP, fixed=True)).mass_exponent == 0
+
+
+def test_the_scatter_of_the_vertical_load_is_about_the_rule() -> None:
+    runs = [run for run in sweep_fit.usable(MADE_UP, fixed=False) if _inside(coefficients(run.scene, SLIDING))]
+    scatter, spread = sweep_fit.vertical_load_scatter(runs)
+    assert scatter == pytest.approx(0, abs=1e-9)
+    assert spread > 0.1
+    raised = [replace(run, vertical_load_ratio=run.vertical_load_ratio + 0.1) for run in runs]
+    assert sweep_fit.vertical_load_scatter(raised) == pytest.approx((0.1, spread))
+
+
 def _inside(numbers: fitted.Coefficients) -> bool:
     return numbers.geometry_change < 1 and numbers.rise_ratio < 1
 
@@ -331,8 +361,12 @@ def test_plan_collect_and_fit_on_the_command_line(tmp_path: Path) -> None:
     fit = call("fit", str(TABLE))
     assert fit.exit_code == 0
     assert "sliding, calibrated" in fit.stdout
+    assert "a      b" in fit.stdout
+    assert "their own spread is 0.25" in fit.stdout
     content = json.loads(call("fit", str(TABLE), "--json").stdout)
     assert content["fixed"]["calibrated"]["displacement_factor"] is None
+    assert 0 < content["fixed"]["standard_errors"]["jet"] < 0.1
+    assert 0 < content["sliding"]["vertical_load"]["scatter"] < content["sliding"]["vertical_load"]["spread"]
     small = tmp_path / "small.csv"
     sweep.write_table(sweep.read_table(TABLE)[:10], small)
     assert "a fit needs 20" in call("fit", str(small)).stderr
