@@ -16,11 +16,11 @@ from .layout import (
     TIME_STEP,
 )
 
-MAX_ITERATIONS = 60
+MAX_ITERATIONS = 120
 
 SECANTS = 12
-"""Iterations of regula falsi, after which the bracket is halved: in one step of thousands the flow's impulse jumps at
-some velocity of the barrier, at which a node is let go; only halving closes in on that."""
+"""Iterations of regula falsi, after which every other one halves the bracket: in one step of thousands the flow's
+impulse jumps at some velocity of the barrier, at which a node is let go; only halving closes in on that."""
 
 
 def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module: str) -> SimpleNamespace:
@@ -42,8 +42,9 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     respond = contact.respond
     impulse = contact.impulse
     CARRIED = types.effects.barrier_friction and types.effects.liquid
-    # Relative width of a bracket that is closed: impulses are rounded to the scalar's precision.
-    CLOSED = 1.0e-12 if types.effects.precision == "float64" else 1.0e-6
+    # Relative width of a bracket that cannot be closed any further, as impulses are rounded to the scalar's precision,
+    # and of one in which the velocity counts as found.
+    CLOSED, FOUND = (1.0e-15, 1.0e-10) if types.effects.precision == "float64" else (1.0e-7, 1.0e-4)
 
     @wp.func
     def flow_impulse(
@@ -108,7 +109,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
             width = high
             closed = wp.float64(CLOSED) * high
             while iterations < wp.static(MAX_ITERATIONS) and wp.abs(residual) > tolerance and width > closed:
-                if bracketed and iterations >= wp.static(SECANTS):
+                if bracketed and iterations >= wp.static(SECANTS) and iterations % 2 == 0:
                     v = wp.float64(0.5) * (low + high)
                 elif bracketed:
                     v = (low * high_residual - high * low_residual) / (high_residual - low_residual)
@@ -138,7 +139,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
                 iterations += 1
             new = sign * v
             wp.atomic_add(counters, wp.static(BARRIER_ITERATIONS), iterations)
-            if wp.abs(residual) > tolerance * wp.float64(1.0e3) and width > wp.float64(100.0) * closed:
+            if wp.abs(residual) > tolerance * wp.float64(1.0e3) and width > wp.float64(FOUND) * high:
                 wp.atomic_add(counters, wp.static(BARRIER_UNCONVERGED), 1)
             # The momentum balance is closed exactly with the friction that is recorded.
             friction = momentum + j[0] - mass * new
