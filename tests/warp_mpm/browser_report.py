@@ -99,7 +99,7 @@ def test_pointer_on_the_material_shows_its_values(page):
 def test_every_section_is_filled(page):
     assert page.locator("canvas.viewer").count() == 2
     assert page.locator("#charts .chart").count() >= 6
-    assert page.locator("canvas.still").count() == 4  # two runs at 1 s and 2 s; the runs end before 4 s
+    assert page.locator("canvas.still").count() == 6  # two runs, each at a sixth, a third and two thirds of it
     for table in ("figure-table", "ledger-table", "settings-table", "versions-table"):
         assert page.locator(f"#{table} tr").count() > 3
     assert page.locator("#problem").is_hidden()
