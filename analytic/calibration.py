@@ -342,11 +342,6 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> Key
         return float(series[name].max()) if name in series else None
 
     energy = series.get("flow_kinetic_energy")
-    at_least = list(measured.at_least)
-    if not at_rest(series):
-        at_least.append("barrier_displacement_final")
-        if series["barrier_velocity"][-1] == series["barrier_velocity"].max():
-            at_least += ["barrier_velocity_max", "barrier_kinetic_energy_max"]
     return KeyFigures(
         peak_force=measured.peak_force,
         rise_time=measured.rise_time,
@@ -360,8 +355,18 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> Key
         barrier_displacement_final=float(series["barrier_displacement"][-1])
         if "barrier_displacement" in series
         else None,
-        at_least=tuple(at_least),
+        at_least=bounded_from_below(series, measured),
     )
+
+
+def bounded_from_below(series: Mapping[str, Array], measured: Measured) -> tuple[str, ...]:
+    """Names of the key figures that a record only bounds from below, because impact or sliding outlast it."""
+    found = list(measured.at_least)
+    if not at_rest(series):
+        found.append("barrier_displacement_final")
+        if series["barrier_velocity"][-1] == series["barrier_velocity"].max():
+            found += ["barrier_velocity_max", "barrier_kinetic_energy_max"]
+    return tuple(found)
 
 
 def at_rest(series: Mapping[str, Array]) -> bool:

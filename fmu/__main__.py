@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from warp_mpm.commands.refusals import ScenarioCommandLine, with_options
+from warp_mpm.commands.options import ScenarioCommandLine, with_options
 
 if TYPE_CHECKING:
     from fmu.cross_check import CrossCheck

@@ -28,15 +28,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.calibration import (
-    Measured,
-    calibrate,
-    cumulative_impulse,
-    measure,
-    measured_vertical_load_ratio,
-    moving_mean,
-    warnings,
-)
+from analytic.calibration import bounded_from_below, calibrate, measure, measured_vertical_load_ratio, warnings
+from analytic.force_record import cumulative_impulse, moving_mean
 from analytic.impact import friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
 
@@ -150,7 +143,8 @@ def cross_check(
         ways["with vertical load"] = calibrated | {"vertical_load_ratio": max(kappa, 0.0)}
     ways["simulated force"] = {"impact_force_source": 2}
     figures = key_figures(simulated)
-    at_least = _at_least(simulated, fit.measured)
+    moved = {"barrier_velocity": simulated.barrier_velocity}
+    at_least = tuple(name for name in bounded_from_below(moved, fit.measured) if name in FIGURES)
     comparisons = []
     for name, own in ways.items():
         parameters = common | own
@@ -166,7 +160,7 @@ def cross_check(
                 {key: _root_mean_square(getattr(trajectory, key), getattr(simulated, key)) for key in CURVES},
             )
         )
-    over = warnings({"barrier_velocity": simulated.barrier_velocity}, fit.measured)
+    over = warnings(moved, fit.measured)
     return CrossCheck(
         scenario.title,
         scene,
@@ -177,16 +171,6 @@ def cross_check(
         at_least,
         (*scene.notes, *(f"≥: {warning}." for warning in over)),
     )
-
-
-def _at_least(simulated: Trajectory, measured: Measured) -> tuple[str, ...]:
-    found = [name for name in FIGURES if name in measured.at_least]
-    velocity = simulated.barrier_velocity
-    if velocity[-1] != 0:
-        found.append("barrier_displacement_final")
-        if velocity[-1] == velocity.max():
-            found.append("barrier_velocity_max")
-    return tuple(found)
 
 
 def simulate(

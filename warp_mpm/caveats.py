@@ -11,7 +11,7 @@ import numpy as np
 from warp_mpm.scenario import Prescribed, Scenario
 
 LEAST_CELLS = 4.0
-"""Cells over the flow's depth below which figures were a tenth off and more (peak force of case 1 at 3.75: 11 %)."""
+"""Cells over the flow's depth below which even peak forces were a tenth off (case 1 at 3.75: 11 %)."""
 
 WATER = 1000.0
 """Density [kg/m³] that no rock falls short of."""

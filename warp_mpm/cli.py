@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from analytic.command_line import BAD_INPUT, complain
+from analytic.command_line import BAD_INPUT, complain, refusals
 from warp_mpm.commands import register
 from warp_mpm.commands.check import check
-from warp_mpm.commands.refusals import ScenarioCommandLine, refusals, with_options
+from warp_mpm.commands.options import ScenarioCommandLine, with_options
 
 if TYPE_CHECKING:
     from warp_mpm.scenario import Scenario

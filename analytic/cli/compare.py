@@ -10,7 +10,8 @@ import typer
 
 from analytic.cli.calibrate import load
 from analytic.cli.predict import choose_model, make_impact, option
-from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
+from analytic.command_line import refusals
 from analytic.fitted import CALIBRATED, beyond_fit, calibrated_impact
 from analytic.impact import VARIANTS
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, read_scene

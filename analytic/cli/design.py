@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from analytic.cli.predict import option
-from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
+from analytic.command_line import refusals
 from analytic.fitted import beyond_fit
 from analytic.impact import STANDARD_GRAVITY, friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene, read_scene

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, refusals, write_plot
+from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
+from analytic.command_line import refusals
 
 sweep = typer.Typer(help="Fit the calibrated variant to a sweep of simulations.", no_args_is_help=True)
 

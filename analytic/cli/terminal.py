@@ -10,8 +10,6 @@ from typing import Annotated, Any
 
 import typer
 
-from analytic.command_line import refusals as refusals
-
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI units per metre of width.")]
 Plot = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a png, pdf or svg file.")

@@ -150,7 +150,7 @@ def test_the_simulator_s_summary_judges_alike(end: float) -> None:
     found = measure(series["time"], series["impact_force_x"])
     assert found.over is (theirs["impact_end_time"] is not None)
     if found.over:
-        assert found.duration == pytest.approx(theirs["impact_duration"], abs=0.01)
+        assert found.duration == pytest.approx(theirs["impact_duration"], rel=1e-12)
 
 
 def test_a_barrier_that_still_moves_is_told() -> None:

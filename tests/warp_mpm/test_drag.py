@@ -68,8 +68,8 @@ def test_gravity_works_on_the_liquid_that_moves_through_the_skeleton(load_scene)
         simulation.advance(DURATION * record / 40)
         work = simulation.sample()["seepage_work"]
     exact = liquid * gravity @ [1.0, -0.5] * (1.0 - np.exp(-RATE * DURATION)) / RATE
-    # The drag's error of first order in the step (above: a fifth of that at a Courant number of 0.8 is left).
-    assert work == pytest.approx(exact, rel=0.03)
+    # The drag is of first order in the step: 1.4 % too much here, 0.9 % with two thirds of the step.
+    assert work == pytest.approx(exact, rel=0.02)
 
 
 def test_a_permeable_flow_creates_no_energy(load_scene):
@@ -84,9 +84,9 @@ def test_a_permeable_flow_creates_no_energy(load_scene):
         samples.append(simulation.sample())
     series = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
     assert series["seepage_work"][-1] > 0.0
-    assert energy_error(series) < 1e-4
+    assert energy_error(series) == 0.0
     # Liquid that sinks has less potential energy than the skeleton that it is carried with.
-    assert energy_error(series | {"seepage_work": np.zeros(101)}) > 10 * energy_error(series)
+    assert energy_error(series | {"seepage_work": np.zeros(101)}) > 1e-4
 
 
 def test_factor_of_one_step(load_scene):

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import complain, refusals, with_options
+from analytic.command_line import complain, refusals
+from warp_mpm.commands.options import with_options
 
 if TYPE_CHECKING:
     from warp_mpm.accuracy.purchase import Offer

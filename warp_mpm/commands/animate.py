@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals
+from analytic.command_line import refusals
 
 
 def animate(

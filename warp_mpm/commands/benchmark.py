@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals
+from analytic.command_line import refusals
 
 if TYPE_CHECKING:
     from warp_mpm.performance.table import Table

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from warp_mpm.commands.refusals import refusals, with_options
+from analytic.command_line import refusals
+from warp_mpm.commands.options import with_options
 
 if TYPE_CHECKING:
     from rich.console import Console

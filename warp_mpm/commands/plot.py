@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from warp_mpm.commands.refusals import DEFAULT_TIMES, refusals, times_of, times_within
+from analytic.command_line import refusals
+from warp_mpm.commands.options import DEFAULT_TIMES, times_of, times_within
 
 
 class Kind(StrEnum):

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from warp_mpm.commands.refusals import complain, refusals
+from analytic.command_line import complain, refusals
 
 DIVERGED, INTERRUPTED = 3, 130
 """Exit codes of `run` that leave results behind."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from warp_mpm.commands.refusals import complain, refusals
+from analytic.command_line import complain, refusals
 
 CASE_FAILED = 4
 """Exit code when the sweep went through and some of its cases failed."""

@@ -31,7 +31,7 @@ def validate(
     """
     from rich.console import Console
 
-    from warp_mpm.commands.refusals import refusals
+    from analytic.command_line import refusals
     from warp_mpm.validation import catalogue, page
 
     with refusals():

@@ -1,13 +1,11 @@
-"""One sentence for what cannot be done, with the scenario's own ranges for the options that change it."""
+"""Options that several commands share: those in place of a field of the scenario, with its range, and times."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from analytic.command_line import CommandLine
-from analytic.command_line import complain as complain
-from analytic.command_line import refusals as refusals
+from analytic.command_line import CommandLine, complain
 
 if TYPE_CHECKING:
     from warp_mpm.results import Results
