@@ -15,9 +15,11 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
+from warp_mpm.accuracy import purchase
 from warp_mpm.accuracy.check import Check, drawn, holds, table
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.formulas import formulas
+from warp_mpm.accuracy.keys import MEASUREMENT, code_text, imported_by, run_key, scenario_fields, scene_key
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.pictures import error_against_time
 from warp_mpm.accuracy.purchase import (
@@ -32,7 +34,7 @@ from warp_mpm.accuracy.purchase import (
     sold_spacings,
 )
 from warp_mpm.accuracy.runner import StudyProgress, run_settings
-from warp_mpm.accuracy.study import COMBINATIONS, DEFAULT, KNOBS, ladder, plan, run_key, scene_key
+from warp_mpm.accuracy.study import COMBINATIONS, DEFAULT, KNOBS, ladder, plan
 from warp_mpm.accuracy.tables import csv_table, markdown
 from warp_mpm.accuracy.verdict import Study, evaluate, front
 from warp_mpm.scenario import Scenario
@@ -153,6 +155,54 @@ class TestPlan:
         assert run_key(scene) != run_key(scene.replaced({"numerics.courant_number": 0.5}))
         assert scene_key(scene) == scene_key(scene.replaced({"numerics.spacing_m": 0.2}))
         assert scene_key(scene) != scene_key(scene.replaced({"output.end_time_s": 2.0}))
+
+
+class TestKeys:
+    def test_optional_field_that_is_new_leaves_keys_as_they_were(self, scene: Scenario) -> None:
+        class NumericsWithMore(type(scene.numerics)):  # type: ignore[misc]
+            more: float = 0.0
+
+        settings = scene.numerics.model_dump()
+        plain = scene.model_copy(update={"numerics": NumericsWithMore(**settings)})
+        turned = scene.model_copy(update={"numerics": NumericsWithMore(**settings, more=1.0)})
+        assert run_key(plain) == run_key(scene)
+        assert run_key(turned) != run_key(scene)
+
+    def test_default_that_changes_changes_the_key(self, scene: Scenario) -> None:
+        class OtherDefault(type(scene.numerics)):  # type: ignore[misc]
+            courant_number: float = 0.4
+
+        assert "numerics.courant_number" in scenario_fields(scene)
+        given = {name: value for name, value in scene.numerics.model_dump().items() if name != "courant_number"}
+        other = scene.model_copy(update={"numerics": OtherDefault(**given)})
+        assert run_key(other) != run_key(scene)
+
+    def test_measurement_rests_on_what_it_imports(self) -> None:
+        found = imported_by(MEASUREMENT)
+        assert {"warp_mpm.summary", "analytic.force_record", "warp_mpm.simulation", "warp_mpm.scenario.flow"} <= found
+        assert {"warp_mpm.kernels.transfer", "warp_mpm.mechanism"} <= found
+        assert not {"warp_mpm.report", "warp_mpm.cli", "analytic.plots"} & found
+
+    def test_words_of_the_code_do_not_count_and_rules_do(self) -> None:
+        rule = 'def peak(force):\n    """The greatest."""\n    return max(force)  # of all\n'
+        reworded = 'def peak(force):\n    """Greatest of them."""\n    return max(force)\n'
+        assert code_text(rule, schema=False) == code_text(reworded, schema=False)
+        assert code_text(rule, schema=False) != code_text(rule.replace("max", "min"), schema=False)
+
+    def test_declarations_of_the_schema_do_not_count_and_its_checks_do(self) -> None:
+        group = "class Group(Model):\n    a: float = 1.0\n\n    def twice(self):\n        return 2 * self.a\n"
+        more = group.replace("a: float = 1.0\n", "a: float = 1.0\n    b: float = 0.0\n")
+        assert code_text(group, schema=True) == code_text(more, schema=True)
+        assert code_text(group, schema=False) != code_text(more, schema=False)
+        assert code_text(group, schema=True) != code_text(group.replace("2 *", "3 *"), schema=True)
+
+    def test_ladder_whose_figures_were_made_by_other_rules_is_not_used(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert purchase.shipped_ladders(), (
+            "The rules that make figures have changed: python -m warp_mpm accuracy scenarios/*.json "
+            "--data warp_mpm/accuracy/paper_scenes.json"
+        )
+        monkeypatch.setattr(purchase, "rules_digest", lambda: "other")
+        assert not purchase.shipped_ladders()
 
 
 class TestVerdict:

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.accuracy import purchase
+from warp_mpm.accuracy.keys import scene_key
 from warp_mpm.accuracy.report import put_into_page
-from warp_mpm.accuracy.study import scene_key
 from warp_mpm.cli import app
 from warp_mpm.scenario import Scenario
 

@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from analytic.whole_file import write_whole
+from warp_mpm.accuracy.keys import run_key
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.purchase import Offer, PurchaseError, aligned, buy, figures_of
 from warp_mpm.accuracy.runner import Result
-from warp_mpm.accuracy.study import ladder, run_key
+from warp_mpm.accuracy.study import ladder
 from warp_mpm.scenario import Scenario
 
 SCENES, SEED = 10, 20261123

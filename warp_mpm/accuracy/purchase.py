@@ -17,13 +17,11 @@ import numpy as np
 from analytic.force_record import cumulative_impulse
 from analytic.whole_file import write_whole
 from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
+from warp_mpm.accuracy.keys import DATA, rules_digest, scenario_fields, scene_key
 from warp_mpm.accuracy.runner import Result
-from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder, scene_key
+from warp_mpm.accuracy.study import SERIES_INTERVAL, Setting, ladder
 from warp_mpm.results import Results
 from warp_mpm.scenario import Scenario, Trapezoid
-
-DATA = "paper_scenes.json"
-"""Ladders of the paper's scenes, beside this file."""
 
 PROBE_CELLS = (6.0, 8.0, 11.0, 15.0)
 """Spacings of a probe: cells in the flow's depth. The finest costs a few per cent of a run of 40 cells."""
@@ -330,7 +328,9 @@ class _Law:
 
 
 def shipped_ladders() -> dict[str, list[Rung]]:
-    """Ladders of the paper's scenes by the scene's key."""
+    """Ladders of the paper's scenes by the scene's key; none where other rules made their figures."""
+    if _data().get("rules") != rules_digest():
+        return {}
     return {key: [Rung(**rung) for rung in one["rungs"]] for key, one in _data()["scenes"].items()}
 
 
@@ -343,9 +343,11 @@ def _data() -> dict[str, Any]:
 
 def write_data(path: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]], results: Mapping[str, Result]) -> None:
     """Write the ladders of scenes, as `shipped_ladders` reads them."""
+    fields = sorted({path for scene, _ in scenes for path in scenario_fields(scene)})
     content = {
         "about": "Written by `python -m warp_mpm accuracy SCENARIO... --data FILE`; times are CPU times [s].",
-        "scenes": {},
+        "rules": rules_digest(),
+        "fields": fields,
     }
     found: dict[str, Any] = {}
     for scene, settings in scenes:
@@ -355,7 +357,10 @@ def write_data(path: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]],
             if setting.knob == "default" and results[setting.key]["status"] == "finished"
         ]
         if len(rungs) >= 3 and rungs[0].figures:
-            found[scene_key(scene)] = {"title": scene.title, "rungs": [rung.__dict__ for rung in rungs]}
+            found[scene_key(scene, frozenset(fields))] = {
+                "title": scene.title,
+                "rungs": [rung.__dict__ for rung in rungs],
+            }
     write_whole(path, json.dumps(content | {"scenes": found}, indent=1, ensure_ascii=False) + "\n")
 
 

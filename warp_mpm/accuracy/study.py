@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import Any
 
+from warp_mpm.accuracy.keys import run_key
 from warp_mpm.scenario import DryFlow, Scenario, TwoPhaseFlow, UndrainedFlow
 
 SERIES_INTERVAL = 0.01
@@ -45,17 +42,6 @@ FULL_COMBINATIONS: tuple[tuple[str, Any], ...] = (("bulk_viscosity", 0.0), ("vol
 """Settings that get a ladder of their own; the second line in a full study only."""
 
 SPACING, DEFAULT = "spacing_m", "default"
-
-_KERNELS = (
-    "kernels/*.py",
-    "state/*.py",
-    "simulation.py",
-    "discretization.py",
-    "geometry.py",
-    "grid.py",
-    "effect*.py",
-    "time_step.py",
-)
 
 
 @dataclass(frozen=True)
@@ -128,34 +114,6 @@ def without_effects(scenario: Scenario) -> dict[str, Scenario]:
     if scenario.barrier is not None and scenario.barrier.motion.kind == "sliding":
         found["fixed"] = scenario.replaced({"barrier.motion": {"kind": "fixed"}})
     return found
-
-
-def run_key(scenario: Scenario) -> str:
-    """A hash of all that decides the numbers: the scene, its numerics, and the program that computes them."""
-    text = json.dumps(_essential(scenario), sort_keys=True) + program_digest()
-    return hashlib.sha256(text.encode()).hexdigest()[:20]
-
-
-def scene_key(scenario: Scenario) -> str:
-    """A hash of the scene and its end time alone, whatever the numerics and the output."""
-    data = _essential(scenario)
-    del data["numerics"]
-    data["output"] = data["output"]["end_time_s"]
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:20]
-
-
-@cache
-def program_digest() -> str:
-    """A hash of the source code that steps the simulation, as it was when first asked for."""
-    root, digest = Path(__file__).parents[1], hashlib.sha256()
-    for pattern in _KERNELS:
-        for path in sorted(root.glob(pattern)):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def _essential(scenario: Scenario) -> dict[str, Any]:
-    return {name: value for name, value in scenario.resolved().items() if name not in ("title", "source", "notes")}
 
 
 def _bare(scenario: Scenario) -> Scenario:
