@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from warp_mpm.effect_rules import effect_rules
+from warp_mpm.effect_rules import derive_effects, effect_rules
+from warp_mpm.performance import two_devices
 from warp_mpm.performance.benchmark import SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
@@ -114,3 +115,56 @@ def test_tables_find_their_place_in_a_page(tmp_path):
     )
     with pytest.raises(ValueError, match="benchmark NAME"):
         put_into_page(tmp_path / "none.md", tables, "a machine")
+
+
+class TestTwoDevices:
+    """`benchmark gpu`, rehearsed on the CPU."""
+
+    @pytest.fixture
+    def one_scene(self, load_scene, monkeypatch):
+        base = load_scene("case_1", **{"output.end_time_s": 0.3, "numerics.spacing_m": 0.5})
+        monkeypatch.setattr(two_devices, "scenes", lambda _: {"sliding": base})
+        return base
+
+    def test_a_device_agrees_with_itself(self, one_scene):
+        table, agree = two_devices.agreement(one_scene, device="cpu", progress=lambda name: None)
+        assert agree
+        assert table.rows[0][-1] == "agrees"
+
+    def test_a_device_that_is_off_by_a_millionth_differs(self, one_scene, monkeypatch):
+        true_run = two_devices._run
+
+        def run(scene, device, *, nudge=0.0):
+            found = true_run(scene, "cpu", nudge=nudge)
+            return found if device == "cpu" else found | {"impact_force_x": found["impact_force_x"] * (1.0 + 1e-6)}
+
+        monkeypatch.setattr(two_devices, "_run", run)
+        table, agree = two_devices.agreement(one_scene, device="cuda:0", progress=lambda name: None)
+        assert not agree
+        assert table.rows[0][-1] == "DIFFERS"
+
+    def test_figures_that_are_no_numbers_differ(self):
+        right = {
+            "time": np.array([0.0, 1.0]), "impact_force_x": np.ones(2), "barrier_displacement": np.ones(2),
+            "flow_kinetic_energy": np.ones(2),
+        }  # fmt: skip
+        assert set(two_devices.differences(right, right).values()) == {0.0}
+        wrong = right | {"flow_kinetic_energy": np.array([1.0, np.nan])}
+        assert two_devices.differences(wrong, right)["kinetic energy"] == np.inf
+
+    def test_the_scenes_have_every_effect_between_them(self, load_scene):
+        """But for elasticity, which only leaves a part of `update` out, and a smooth barrier."""
+        chosen = [derive_effects(scene) for scene in two_devices.scenes(load_scene("case_1")).values()]
+        seen = {name: {getattr(effects, name) for effects in chosen} for name in vars(chosen[0])}
+        assert seen["formulation"] == {"dry", "undrained", "two_phase"}
+        assert seen["barrier"] == {"fixed", "sliding", "driven"}
+        assert seen["transfer"] == {"flip", "apic"}
+        assert seen["precision"] == {"float64", "float32"}
+        assert seen["ground"] == {"smooth", "frictional"}
+        assert {True} <= seen["side_walls"] & seen["ceiling"] & seen["porosity_update"]
+
+    def test_throughput_is_told_by_size_and_precision(self, one_scene, monkeypatch):
+        monkeypatch.setattr(two_devices, "DRY_RUN_SIZES", (500,))
+        table = two_devices.throughput(one_scene, device="cpu", progress=lambda name: None)
+        assert [row[0] for row in table.rows] == ["float64", "float32"]
+        assert all(float(row[2]) > 0.0 for row in table.rows)
