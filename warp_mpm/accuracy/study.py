@@ -48,6 +48,7 @@ SPACING, DEFAULT = "spacing_m", "default"
 
 _KERNELS = (
     "kernels/*.py",
+    "simulator/bodies/*.py",
     "state/*.py",
     "simulation.py",
     "discretization.py",
