@@ -35,8 +35,8 @@ def derive_effects(scenario: Scenario) -> Effects:
 
 
 def effect_rules(scenario: Scenario) -> list[Rule]:
-    """One rule per field of `Effects`: the flow, the numerics, the surfaces."""
-    return [*_material_rules(scenario), *_numerical_rules(scenario), *_surface_rules(scenario)]
+    """One rule per field of `Effects`: the flow, the numerics, the bodies."""
+    return [*_material_rules(scenario), *_numerical_rules(scenario), *_body_rules(scenario)]
 
 
 def _material_rules(scenario: Scenario) -> list[Rule]:
@@ -114,42 +114,41 @@ def _numerical_rules(scenario: Scenario) -> list[Rule]:
     ]
 
 
-def _surface_rules(scenario: Scenario) -> list[Rule]:
+def _body_rules(scenario: Scenario) -> list[Rule]:
     barrier, ground, domain = scenario.barrier, scenario.ground, scenario.domain
-    motion, rubs = "none", False
-    other_motion: dict[str, Any] = {}
-    other_friction: dict[str, Any] = {}
-    why = why_rubs = "there is no barrier"
+    kind = "none" if barrier is None else barrier.motion.kind
+    why_moves = "there is no barrier" if barrier is None else f"barrier.motion.kind = {kind}"
+    fixed = {"barrier.motion": {"kind": "fixed"}}
+    edges = [
+        f"domain.{name} = wall" for name in ("left_edge", "right_edge", "top_edge") if getattr(domain, name) == "wall"
+    ]
+    solid = [name for name, there in (("ground", ground), ("barrier", barrier)) if there is not None] + edges
+    frictions, rough, smooth = [], {}, {}
     if barrier is not None:
-        motion = {"fixed": "fixed", "sliding": "sliding", "prescribed": "driven"}[barrier.motion.kind]
-        why = f"barrier.motion.kind = {barrier.motion.kind}"
-        other_motion = {"barrier": None} if motion == "fixed" else {"barrier.motion": {"kind": "fixed"}}
         greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
-        rubs = greatest > 0.0
-        why_rubs = f"the greatest of barrier.friction is {greatest:g}"
-        other_friction = {"barrier.friction": 0.0 if rubs else 0.3}
-    surface = "none" if ground is None else "frictional" if ground.friction > 0.0 else "smooth"
-    walls = [name for name in ("left_edge", "right_edge") if getattr(domain, name) == "wall"]
+        frictions.append((greatest, f"the greatest of barrier.friction is {greatest:g}"))
+        rough["barrier.friction"], smooth["barrier.friction"] = 0.3, 0.0
+    if ground is not None:
+        frictions.append((ground.friction, f"ground.friction = {ground.friction:g}"))
+        rough["ground.friction"], smooth["ground.friction"] = 0.3, 0.0
+    rubs = any(friction > 0.0 for friction, _ in frictions)
+    passing = kind in ("sliding", "prescribed") and any("top" not in edge for edge in edges)
     return [
-        Rule("barrier", motion, why, other_motion),
-        Rule("barrier_friction", rubs, why_rubs, other_friction),
+        Rule("bodies", bool(solid), ", ".join(solid) if solid else "nothing solid is there"),
         Rule(
-            "ground",
-            surface,
-            "ground = null" if ground is None else f"ground.friction = {ground.friction:g}",
-            {} if ground is None else {"ground.friction": 0.0 if surface == "frictional" else 0.3},
+            "friction",
+            rubs,
+            ", ".join(why for friction, why in frictions if friction > 0.0 or not rubs) or "nothing solid is there",
+            smooth if rubs else rough,
         ),
+        Rule("sliding", kind == "sliding", why_moves, fixed if kind == "sliding" else {}),
+        Rule("driven", kind == "prescribed", why_moves, fixed if kind == "prescribed" else {}),
         Rule(
-            "side_walls",
-            bool(walls),
-            " and ".join(f"domain.{name} = wall" for name in walls) if walls else "both edges of the domain are open",
-            dict.fromkeys(("domain.left_edge", "domain.right_edge"), "open" if walls else "wall"),
-        ),
-        Rule(
-            "ceiling",
-            domain.top_edge == "wall",
-            f"domain.top_edge = {domain.top_edge}",
-            {"domain.top_edge": "open" if domain.top_edge == "wall" else "wall"},
+            "passing",
+            passing,
+            "the grid rides with the barrier past the domain's walls"
+            if passing
+            else "the grid rests or passes nothing",
         ),
     ]
 

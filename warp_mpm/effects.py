@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,16 @@ class Effects:
     """Interaction of the phases; only with two of them."""
     porosity_update: bool = False
     """Porosity follows the skeleton's volume strain; off: Dn/Dt = 0, Eq. (A11)."""
-    barrier: Literal["none", "fixed", "sliding", "driven"] = "none"
-    """Driven: its velocity is given, as a table of the scene or from outside during the run."""
-    barrier_friction: bool = False
-    ground: Literal["none", "smooth", "frictional"] = "none"
-    side_walls: bool = False
-    """Smooth vertical walls at the left or right edge of the domain."""
-    ceiling: bool = False
-    """Smooth wall at the upper edge of the domain."""
+    bodies: bool = False
+    """Something solid is there: ground, walls, a barrier."""
+    friction: bool = False
+    """Some surface rubs on the flow, so that the effective normal force is needed."""
+    sliding: bool = False
+    """Some body slides on its base: its velocity is found together with the contact."""
+    driven: bool = False
+    """Some body's velocity is given, as a table or from outside during the run."""
+    passing: bool = False
+    """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
 
     @property
     def liquid(self) -> bool:
@@ -56,10 +59,15 @@ class Effects:
         """The grid of cell corners exists."""
         return self.volumetric_smoothing or self.pressure_relaxation
 
+    def with_bodies(self, decided: Mapping[str, bool]) -> Effects:
+        """The same with other bodies, of which `decided` says what they call for."""
+        others: dict[str, Any] = dict(decided)
+        return replace(self, **others)
+
     @property
-    def friction(self) -> bool:
-        """Some surface rubs on the flow, so that the effective normal force is needed."""
-        return self.barrier_friction or self.ground == "frictional"
+    def moving(self) -> bool:
+        """Some body moves."""
+        return self.sliding or self.driven
 
     @property
     def liquid_alone(self) -> bool:
@@ -69,7 +77,7 @@ class Effects:
     @property
     def module_name(self) -> str:
         """Name of the Warp module: one per set of effects."""
-        flags: list[str] = [self.formulation, self.precision, self.transfer, self.drag, self.barrier, self.ground]
+        flags: list[str] = [self.formulation, self.precision, self.transfer, self.drag]
         flags += [
             name
             for name in (
@@ -78,10 +86,12 @@ class Effects:
                 "density_correction",
                 "pressure_relaxation",
                 "porosity_update",
-                "barrier_friction",
-                "side_walls",
-                "ceiling",
                 "bulk_viscosity",
+                "bodies",
+                "friction",
+                "sliding",
+                "driven",
+                "passing",
             )
             if getattr(self, name)
         ]

@@ -7,7 +7,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -23,14 +23,41 @@ from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
+from .simulator.bodies import Body, Driven, Sliding
+from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of, passes
+from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .state import saved
-from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
+from .state.arrays import clock_arrays, grid_arrays, point_arrays
 from .state.divergence import NAMES, SimulationDiverged, what_diverged
 from .state.parameters import kernel_parameters
-from .state.samples import Constants, Totals, sample
+from .state.samples import BarrierNow, Constants, Totals, sample
 from .time_step import step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
+
+
+STATE_OF_BODIES = (
+    *("displacement", "velocity", "old_velocity", "impulse", "work"),
+    *("external_force", "base_impulse", "base_work", "times", "velocities"),
+)
+"""Arrays of the bodies that change during a run."""
+
+
+def _check_names(bodies: Sequence[Body]) -> None:
+    for kind, names in (
+        ("body", [body.name for body in bodies]),
+        ("surface", [surface.name for body in bodies for surface in body.surfaces]),
+    ):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"name = {twice[0]!r} belongs to more than one {kind}; each needs a name of its own")
+
+
+def _check_room(bodies: Sequence[Body], initial: MaterialPoints, spacing: float) -> None:
+    for body in bodies:
+        inside = int((body.outline.distance(initial.position) < -1e-9 * spacing).sum())
+        if inside:
+            raise ValueError(f"{body.name} holds {inside} material points of the flow; it must lie outside the flow")
 
 
 @cache
@@ -67,14 +94,19 @@ class Simulation:
     Args:
         scenario: what to simulate.
         device: a Warp device, "cpu" or "cuda:0".
+        bodies: solid bodies beside those of the scenario, which the flow meets as well.
 
     Raises:
-        ValueError: the device does not exist.
+        ValueError: the device does not exist, or the bodies are no scene's: two of one name, flow inside one of them.
     """
 
-    def __init__(self, scenario: Scenario, *, device: str = "cpu") -> None:
+    def __init__(self, scenario: Scenario, *, device: str = "cpu", bodies: Sequence[Body] = ()) -> None:
         self.scenario = scenario
-        self.effects = derive_effects(scenario)
+        self.grid = fit_grid(scenario, [body.outline.vertices for body in bodies])
+        self.bodies: tuple[Body, ...] = (*scene_bodies(scenario, self.grid), *bodies)
+        """All that the flow meets, in the order in which they act on it."""
+        _check_names(self.bodies)
+        self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
         _start_warp()
         try:
             self.device = wp.get_device(device)
@@ -83,14 +115,20 @@ class Simulation:
             raise ValueError(f"device = {device!r} does not exist here; it must be one of {names}") from None
         self._kernels = build_kernels(self.effects)
         self._types = self._kernels.types
-        self.grid = fit_grid(scenario)
         self._limits = step_limits(scenario)
         # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
         self._workers = 1 if self.device.is_cpu else 65536
         self._parameters = kernel_parameters(
-            scenario, self.effects, self._types, grid=self.grid, limits=self._limits, workers=self._workers
+            scenario,
+            self.effects,
+            self._types,
+            bodies=self.bodies,
+            grid=self.grid,
+            limits=self._limits,
+            workers=self._workers,
         )
         initial = material_points(scenario)
+        _check_room(bodies, initial, self.grid.spacing)
         self.material_points = len(initial.volume)
         self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
         self._make_arrays(initial)
@@ -99,9 +137,8 @@ class Simulation:
         self._commands: list[tuple[str, Any]] | None = None
         self._kernels_of_a_step: tuple[str, ...] = ()
         self._ledger_graph: Any = None
-        mass = scenario.barrier.mass if scenario.barrier is not None else None
-        weight = -mass * scenario.gravity.vector[1] if mass is not None else None
-        self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
+        self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
+        self._constants = Constants(self.effects, self.bodies, self._barrier, scenario.gravity.vector)
         self._last = self._totals()
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
@@ -111,66 +148,56 @@ class Simulation:
         bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
         points = point_arrays(scenario, effects, types, initial, liquid_bulk_modulus=bulk_modulus, device=device)
         self._points, self._point_arrays = points.structure, points.arrays
-        grid = grid_arrays(scenario, effects, types, self.grid, device=device)
+        grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
-        self._contact_count, self._contact_arrays = 0, {}
-        if scenario.barrier is not None:
-            contact = contact_arrays(scenario.barrier, types, self.grid, device=device)
-            self._contact, self._contact_arrays = contact.structure, contact.arrays
-            self._contact_count = len(contact.arrays["node"])
-        self._clock_arrays = clock_arrays(scenario, effects, initial, device=device)
+        solid = body_arrays(self.bodies, effects, types, self.grid, scenario.gravity.vector, device=device)
+        self._bodies, self._body_arrays = solid.structure, solid.arrays
+        self._contacts = contact_arrays(self.bodies, effects, types, self.grid, device=device)
+        surfaces = sum(len(body.surfaces) for body in self.bodies)
+        self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
         self._clock = self._clock_arrays["clock"]
         self._counters = self._clock_arrays["counters"]
+        self._limiters = self._clock_arrays["limiters"]
         self._running = self._clock_arrays["running"]
         self._reactions = self._clock_arrays["reactions"]
         self._left = self._clock_arrays["left"]
+        self._balance = self._clock_arrays["balance"]
         self._sums = self._clock_arrays["sums"]
-        self._times = self._clock_arrays["times"]
-        self._velocities = self._clock_arrays["velocities"]
         self._target = self._clock[at.TARGET : at.TARGET + 1]
         # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
-        self._seen = {name: array.numpy() for name, array in self._clock_arrays.items()} if device.is_cpu else {}
+        self._seen = {}
+        if device.is_cpu:
+            self._seen = {name: array.numpy() for name, array in (self._clock_arrays | self._body_arrays).items()}
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
-    def _launch(self, name: str, dim: Any, *arguments: Any) -> None:
+    def _launch(self, name: str, dim: Any, *arguments: Any, of: str = "") -> None:
+        """Args: name: of the kernel; of: the body that it acts for."""
         kernel, kept = getattr(self._kernels, name), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
+        told = f"{name} {of}" if of else name
         if self._commands is not None:
-            self._commands.append((name, command))
+            self._commands.append((told, command))
         if self._on_launch is not None:
-            self._on_launch(name)
+            self._on_launch(told)
 
     def _step(self) -> None:
-        effects, grid, points, parameters, clock = (
-            self.effects,
-            self._grid,
-            self._points,
-            self._parameters,
-            self._clock,
-        )
+        grid, points, parameters, bodies, clock = self._grid, self._points, self._parameters, self._bodies, self._clock
         count = self.material_points
         self._launch("clear", self._workers, grid, parameters)
         self._launch("forget", 1, grid)
-        self._launch("scatter", count, points, grid, parameters, clock)
+        self._launch("scatter", count, points, grid, parameters, bodies, clock)
         self._launch("move", self._workers, grid, parameters, clock)
-        if effects.ground != "none":
-            self._launch("ground", self._workers, grid, parameters, clock, self._reactions)
-        if effects.side_walls:
-            self._launch("side_walls", self.grid.rows, grid, parameters, clock, self._reactions)
-        if effects.ceiling:
-            self._launch("ceiling", self.grid.columns, grid, parameters, clock, self._reactions)
-        if effects.barrier != "none":
-            self._launch("collect", self._contact_count, self._contact, grid, parameters, clock)
-            if effects.barrier == "sliding":
-                self._launch("slide", 1, self._contact, self._contact_count, parameters, clock, self._counters)
-            self._launch("barrier", self._contact_count, self._contact, grid, parameters, clock, self._reactions)
+        for body, contact in zip(self.bodies, self._contacts, strict=True):
+            self._meet(body, contact)
         self._launch("gather", count, points, grid, parameters, clock)
-        if effects.smoothing_grid:
+        if self.effects.smoothing_grid:
             self._launch("average", self._workers, grid, parameters)
-        self._launch("advect", count, points, grid, parameters, clock, self._counters, self._left)
+        self._launch(
+            "advect", count, points, grid, parameters, bodies, clock, self._counters, self._limiters, self._left
+        )
         self._launch("update", count, points, parameters, clock)
-        self._launch("bound", count, points, parameters, clock)
+        self._launch("bound", count, points, parameters, clock, self._limiters)
         self._launch(
             "tick",
             1,
@@ -180,14 +207,27 @@ class Simulation:
             self._running,
             self._reactions,
             self._left,
-            self._times,
-            self._velocities,
+            self._balance,
+            bodies,
+            grid,
         )
 
+    def _meet(self, body: Body, contact: Any) -> None:
+        """Contact of the flow with one body."""
+        structure, places = contact.structure, len(contact.arrays["node"])
+        grid, parameters, bodies, clock = self._grid, self._parameters, self._bodies, self._clock
+        if passes(body, self.bodies):
+            self._launch("place", places, structure, bodies, grid, parameters, of=body.name)
+        if isinstance(body.motion, Sliding):
+            self._launch("collect", places, structure, bodies, grid, parameters, of=body.name)
+            self._launch("slide", 1, structure, bodies, parameters, clock, self._counters, of=body.name)
+            self._launch("push", places, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
+        else:
+            groups = len(contact.arrays["block"])
+            self._launch("press", groups, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
+
     def _start(self) -> None:
-        self._launch(
-            "start", 1, self._parameters, self._clock, self._counters, self._running, self._times, self._velocities
-        )
+        self._launch("start", 1, self._parameters, self._clock, self._counters, self._running, self._bodies)
 
     def _interval(self) -> None:
         self._start()
@@ -195,7 +235,7 @@ class Simulation:
 
     def _sum_up(self) -> None:
         self._sums.zero_()
-        self._launch("ledger", self._workers, self._points, self._parameters, self._clock, self._sums)
+        self._launch("ledger", self._workers, self._points, self._parameters, self._bodies, self._sums)
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -222,7 +262,8 @@ class Simulation:
     @property
     def arrays(self) -> dict[str, int]:
         """Every array that the simulation holds on the device, by name, with its bytes."""
-        groups = {"points": self._point_arrays, "grid": self._grid_arrays, "contact": self._contact_arrays}
+        groups = {"points": self._point_arrays, "grid": self._grid_arrays, "bodies": self._body_arrays}
+        groups |= {f"contact.{b.name}": c.arrays for b, c in zip(self.bodies, self._contacts, strict=True)}
         held = {f"{group}.{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
         return {name: int(array.capacity) for name, array in (held | self._clock_arrays).items()}
 
@@ -315,8 +356,10 @@ class Simulation:
     # -- state -------------------------------------------------------------------------------------------------
 
     def _read(self, name: str) -> NDArray[Any]:
-        """Present numbers of the clock, the counters or the sums; on the CPU they go on changing with the run."""
-        return self._seen[name] if name in self._seen else self._clock_arrays[name].numpy()
+        """Present numbers of clock, bodies, counters or sums; on the CPU they go on changing with the run."""
+        if name in self._seen:
+            return self._seen[name]
+        return (self._body_arrays if name in self._body_arrays else self._clock_arrays)[name].numpy()
 
     def _clock_entry(self, entry: int) -> float:
         return float(self._read("clock")[entry])
@@ -334,24 +377,53 @@ class Simulation:
     @property
     def barrier_displacement(self) -> float:
         """Displacement of the barrier [m]."""
-        return self._clock_entry(at.GRID_SHIFT)
+        return self.body_displacement(BARRIER)[0] if self._barrier is not None else 0.0
 
     @property
     def barrier_velocity(self) -> float:
         """Velocity of the barrier [m/s]."""
-        return self._clock_entry(at.BARRIER_VELOCITY)
+        return self.body_velocity(BARRIER)[0] if self._barrier is not None else 0.0
+
+    def body_displacement(self, name: str) -> tuple[float, float]:
+        """Displacement of a body along x and y since t = 0 [m].
+
+        Raises:
+            ValueError: there is no such body.
+        """
+        return self._of_body("displacement", name)
+
+    def body_velocity(self, name: str) -> tuple[float, float]:
+        """Velocity of a body along x and y [m/s].
+
+        Raises:
+            ValueError: there is no such body.
+        """
+        return self._of_body("velocity", name)
+
+    def _of_body(self, field: str, name: str) -> tuple[float, float]:
+        names = [body.name for body in self.bodies]
+        if name not in names:
+            raise ValueError(f"there is no body {name!r} in this scene; it has {', '.join(names) or 'none'}")
+        if not self.effects.moving:
+            return 0.0, 0.0
+        x, y = self._read(field)[names.index(name)]
+        return float(x), float(y)
+
+    def _barrier_number(self, field: str) -> float:
+        return float(self._read(field)[self._barrier]) if field in self._body_arrays else 0.0
 
     def set_barrier_velocity(self, velocity: float) -> None:
         """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion."""
-        if self.effects.barrier != "driven":
+        if self._barrier is None or not isinstance(self.bodies[self._barrier].motion, Driven):
             raise ValueError("set_barrier_velocity needs a barrier whose motion is of the kind 'prescribed'")
-        self._velocities.fill_(float(velocity))
+        first, last = self._body_arrays["first_time"].numpy()[self._barrier : self._barrier + 2]
+        self._body_arrays["velocities"][first:last].fill_(wp.vec2d(float(velocity), 0.0))
 
     def set_external_force(self, force: float) -> None:
         """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
-        if self.effects.barrier != "sliding":
+        if self._barrier is None or not isinstance(self.bodies[self._barrier].motion, Sliding):
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
-        self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1].fill_(float(force))
+        self._body_arrays["external_force"][self._barrier : self._barrier + 1].fill_(float(force))
 
     def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
         """State of the N material points still in the domain, as float64 arrays in SI units: all, or what is named.
@@ -395,7 +467,8 @@ class Simulation:
         return {name: quantities[name]() for name in (quantities if names is None else names)}
 
     def _totals(self) -> Totals:
-        return Totals(self._read("clock").tolist(), self._read("reactions").tolist())
+        base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
+        return Totals(self.time, self._read("reactions").tolist(), base_impulse)
 
     def sample(self) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval).
@@ -412,10 +485,21 @@ class Simulation:
         if sums[at.LEDGER_NOT_FINITE] > 0.0:
             raise SimulationDiverged(self._what_diverged())
         totals = self._totals()
+        barrier = BarrierNow()
+        if self._barrier is not None:
+            barrier = BarrierNow(
+                self.barrier_displacement,
+                self.barrier_velocity,
+                self._barrier_number("work"),
+                self._barrier_number("base_work"),
+            )
         values = sample(
             self._constants,
             totals,
             self._last,
+            barrier=barrier,
+            balance=self._read("balance").tolist(),
+            clock=self._read("clock").tolist(),
             sums=sums,
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
@@ -429,7 +513,7 @@ class Simulation:
     def record(self) -> dict[str, Any]:
         """What ruled the run: counts of the limits on the time step, of barrier iterations, of points that left, and of
         the points on which a limiter acted, once per step and point."""
-        counters, clock = self._read("counters"), self._read("clock")
+        counters, clock, limiters = self._read("counters"), self._read("clock"), self._read("limiters")
         return {
             "steps": int(counters[at.STEPS]),
             "steps_limited_by_wave": int(counters[at.LIMIT_WAVE]),
@@ -441,8 +525,8 @@ class Simulation:
             "barrier_unconverged": int(counters[at.BARRIER_UNCONVERGED]),
             "points_left": int(counters[at.POINTS_LEFT]),
             "points_pushed_out": int(counters[at.POINTS_PUSHED]),
-            "gaps_bounded": int(clock[at.GAPS_BOUNDED]),
-            "voids_closed": int(clock[at.VOIDS_CLOSED]),
+            "gaps_bounded": int(limiters[at.GAPS_BOUNDED]),
+            "voids_closed": int(limiters[at.VOIDS_CLOSED]),
         }
 
     def _state_arrays(self) -> dict[str, Any]:
@@ -451,11 +535,13 @@ class Simulation:
         arrays |= {
             "clock": self._clock,
             "counters": self._counters,
+            "limiters": self._limiters,
             "reactions": self._reactions,
             "left": self._left,
-            "times": self._times,
-            "velocities": self._velocities,
+            "balance": self._balance,
+            "grid.shift": self._grid_arrays["shift"],
         }
+        arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
         return arrays
 
     def save_state(self) -> bytes:
@@ -472,16 +558,19 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        self._last = Totals(
-            state["last.clock"].tolist(), state["last.reactions"].tolist(), *state["last.seepage"].tolist()
-        )
+        time, *rest = state["last.numbers"].tolist()
+        self._last = Totals(time, state["last.reactions"].tolist(), *rest)
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
         kept = {
-            "last.clock": self._last.clock,
+            "last.numbers": [
+                self._last.time,
+                self._last.base_impulse,
+                self._last.seepage_power,
+                self._last.seepage_work,
+            ],
             "last.reactions": self._last.reactions,
-            "last.seepage": [self._last.seepage_power, self._last.seepage_work],
             "initial_momentum": self._initial_momentum,
         }
         return state | {name: np.array(values) for name, values in kept.items()}

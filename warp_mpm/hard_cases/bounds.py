@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.grid import barrier_planes
 from warp_mpm.scenario import Prescribed, Scenario, TwoPhaseMaterial
+from warp_mpm.simulator.bodies.of_scene import barrier_body
 from warp_mpm.time_step import step_limits
 
 
@@ -81,7 +81,8 @@ def closing_angle(scenario: Scenario) -> float:
     if scenario.ground is not None:
         surfaces.append(((0.0, 1.0), 0.0))
     if scenario.barrier is not None:
-        surfaces += [(normal, offset) for _, normal, offset in barrier_planes(scenario.barrier)]
+        pieces = barrier_body(scenario.barrier).outline.segments
+        surfaces += [((nx, ny), offset) for (nx, ny), offset in zip(pieces.normal, pieces.offset, strict=True)]
     domain = scenario.domain
     if domain.left_edge == "wall" and domain.left_m is not None:
         surfaces.append(((1.0, 0.0), domain.left_m))

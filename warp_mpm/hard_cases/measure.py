@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.grid import barrier_planes
 from warp_mpm.hard_cases.bounds import impact_speed, pressure_bound, speed_bound
 from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
 from warp_mpm.recording import Schedule
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
+from warp_mpm.simulator.bodies.of_scene import barrier_body
 from warp_mpm.summary import impact_figures, momentum_error
 from warp_mpm.time_step import step_limits
 
@@ -213,10 +213,8 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
     if domain.top_edge == "wall" and domain.top_m is not None:
         depth = np.maximum(depth, y - domain.top_m)
     if scenario.barrier is not None:
-        x = x - (snapshot.barrier_displacement or 0.0)
-        planes = barrier_planes(scenario.barrier)
-        inside = np.min([offset - nx * x - ny * y for _, (nx, ny), offset in planes], axis=0)
-        depth = np.maximum(depth, inside)
+        seen = snapshot.position - [snapshot.barrier_displacement or 0.0, 0.0]
+        depth = np.maximum(depth, -barrier_body(scenario.barrier).outline.distance(seen))
     return float(depth.max() / scenario.numerics.spacing_m)
 
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..effects import Effects
+from ..simulator.bodies.kernels import make_body_functions, make_place
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
@@ -34,8 +35,9 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     types = layout(effects)
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
-    transfer = make_transfer(types, shapes, pore, module)
-    constitutive = make_constitutive(types, shapes, pore, module)
+    bodies = make_body_functions(types) if effects.bodies else None
+    transfer = make_transfer(types, shapes, pore, bodies, module)
+    constitutive = make_constitutive(types, shapes, pore, bodies, module)
     clock = make_clock(types, module)
     kernels = SimpleNamespace(
         types=types,
@@ -46,9 +48,11 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         tick=clock.tick,
         ledger=make_ledger(types, pore, module).ledger,
     )
-    if effects.ground != "none" or effects.side_walls or effects.ceiling or effects.barrier != "none":
-        contact = make_contact(types, module)
+    if effects.bodies:
+        contact = make_contact(types, bodies, module)
         kernels.__dict__.update(contact.kernels)
-        if effects.barrier == "sliding":
+        if effects.passing:
+            kernels.place = make_place(types, bodies, module)
+        if effects.sliding:
             kernels.slide = make_rigid_barrier(types, contact, module).slide
     return kernels

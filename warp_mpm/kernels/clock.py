@@ -7,16 +7,10 @@ import warp as wp
 from .layout import (
     ACTIVE_MASS_LIQUID,
     ACTIVE_MASS_SOLID,
-    BACK,
-    BARRIER_IMPULSE_X,
-    BARRIER_VELOCITY,
-    BARRIER_WORK,
     DIVERGED,
-    FACE,
     FASTEST,
     GRAVITY_IMPULSE_X,
     GRAVITY_IMPULSE_Y,
-    GRID_SHIFT,
     INITIAL_MASS_LIQUID,
     INITIAL_MASS_SOLID,
     LARGEST_TIME_STEP,
@@ -25,14 +19,12 @@ from .layout import (
     LIMIT_DRAG,
     LIMIT_OUTPUT,
     LIMIT_WAVE,
-    OLD_BARRIER_VELOCITY,
     SMALLEST_TIME_STEP,
     SPEED_MAX,
     STEPS,
     TARGET,
     TIME,
     TIME_STEP,
-    TOP,
 )
 
 
@@ -40,9 +32,10 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build the kernels `start` (before an interval's first step) and `tick` (after each step), one thread each."""
     effects = types.effects
     Parameters = types.Parameters
-    BARRIER = effects.barrier != "none"
-    MOVING = effects.barrier in ("sliding", "driven")
-    DRIVEN = effects.barrier == "driven"
+    Bodies = types.Bodies
+    Grid = types.Grid
+    MOVING = effects.moving
+    DRIVEN = effects.driven
 
     @wp.func
     def choose_step(parameters: Parameters, clock: wp.array(dtype=wp.float64), counters: wp.array(dtype=wp.int32)):
@@ -62,22 +55,44 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         clock[wp.static(TIME_STEP)] = remaining / wp.max(count, wp.float64(1.0))
 
     @wp.func
-    def drive(
-        clock: wp.array(dtype=wp.float64), times: wp.array(dtype=wp.float64), velocities: wp.array(dtype=wp.float64)
-    ):
-        """Velocity of a driven barrier in the middle of the coming step: linear between the given times."""
+    def drive(bodies: Bodies, clock: wp.array(dtype=wp.float64)):
+        """Velocities of the driven bodies in the middle of the coming step: linear between the given times."""
         t = clock[wp.static(TIME)] + wp.float64(0.5) * clock[wp.static(TIME_STEP)]
-        last = times.shape[0] - 1
-        v = velocities[last]
-        if t <= times[0]:
-            v = velocities[0]
-        else:
-            for k in range(last):
-                if t > times[k] and t <= times[k + 1]:
-                    share = (t - times[k]) / (times[k + 1] - times[k])
-                    v = velocities[k] + share * (velocities[k + 1] - velocities[k])
-        clock[wp.static(BARRIER_VELOCITY)] = v
-        clock[wp.static(OLD_BARRIER_VELOCITY)] = v
+        for body in range(bodies.count):
+            first = bodies.first_time[body]
+            last = bodies.first_time[body + 1] - 1
+            if first <= last:
+                v = bodies.velocities[last]
+                if t <= bodies.times[first]:
+                    v = bodies.velocities[first]
+                else:
+                    for k in range(first, last):
+                        if t > bodies.times[k] and t <= bodies.times[k + 1]:
+                            share = (t - bodies.times[k]) / (bodies.times[k + 1] - bodies.times[k])
+                            v = bodies.velocities[k] + share * (bodies.velocities[k + 1] - bodies.velocities[k])
+                bodies.velocity[body] = v
+                bodies.old_velocity[body] = v
+
+    @wp.func
+    def carry(bodies: Bodies, grid: Grid, reactions: wp.array(dtype=wp.float64), dt: wp.float64) -> wp.bool:
+        """Move the bodies, and the grid with the one that it rides with; whether all velocities are finite."""
+        sound = wp.bool(True)
+        half = wp.float64(0.5)
+        for body in range(bodies.count):
+            total = wp.vec2d()
+            for surface in range(bodies.first_surface[body], bodies.first_surface[body + 1]):
+                total += wp.vec2d(reactions[2 * surface], reactions[2 * surface + 1])
+            new = bodies.velocity[body]
+            middle = half * (new + bodies.old_velocity[body])
+            bodies.work[body] = bodies.work[body] + wp.dot(total - bodies.impulse[body], middle)
+            bodies.displacement[body] = bodies.displacement[body] + dt * middle
+            bodies.old_velocity[body] = new
+            bodies.impulse[body] = total
+            if body == bodies.carrier:
+                grid.shift[0] = grid.shift[0] + dt * middle[0]
+            if not (wp.isfinite(new[0]) and wp.isfinite(new[1])):
+                sound = wp.bool(False)
+        return sound
 
     @wp.kernel(module=module)
     def start(
@@ -85,14 +100,13 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         clock: wp.array(dtype=wp.float64),
         counters: wp.array(dtype=wp.int32),
         running: wp.array(dtype=wp.int32),
-        times: wp.array(dtype=wp.float64),
-        velocities: wp.array(dtype=wp.float64),
+        bodies: Bodies,
     ):
         go = wp.int32(0)
         if clock[wp.static(TIME)] < clock[wp.static(TARGET)] and counters[wp.static(DIVERGED)] == 0:
             choose_step(parameters, clock, counters)
             if DRIVEN:
-                drive(clock, times, velocities)
+                drive(bodies, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
             go = wp.int32(1)
         running[0] = go
@@ -105,30 +119,28 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         running: wp.array(dtype=wp.int32),
         reactions: wp.array(dtype=wp.float64),
         left: wp.array(dtype=wp.float64),
-        times: wp.array(dtype=wp.float64),
-        velocities: wp.array(dtype=wp.float64),
+        balance: wp.array(dtype=wp.float64),
+        bodies: Bodies,
+        grid: Grid,
     ):
         dt = clock[wp.static(TIME_STEP)]
-        solid = clock[wp.static(ACTIVE_MASS_SOLID)]
-        liquid = clock[wp.static(ACTIVE_MASS_LIQUID)]
+        solid = balance[wp.static(ACTIVE_MASS_SOLID)]
+        liquid = balance[wp.static(ACTIVE_MASS_LIQUID)]
         weight = (solid + liquid) * dt
         gx = wp.float64(parameters.gravity[0])
         gy = wp.float64(parameters.gravity[1])
-        clock[wp.static(GRAVITY_IMPULSE_X)] = clock[wp.static(GRAVITY_IMPULSE_X)] + gx * weight
-        clock[wp.static(GRAVITY_IMPULSE_Y)] = clock[wp.static(GRAVITY_IMPULSE_Y)] + gy * weight
-        if BARRIER:
-            total = reactions[wp.static(2 * FACE)] + reactions[wp.static(2 * TOP)] + reactions[wp.static(2 * BACK)]
-            if MOVING:
-                new = clock[wp.static(BARRIER_VELOCITY)]
-                middle = wp.float64(0.5) * (new + clock[wp.static(OLD_BARRIER_VELOCITY)])
-                work = (total - clock[wp.static(BARRIER_IMPULSE_X)]) * middle
-                clock[wp.static(BARRIER_WORK)] = clock[wp.static(BARRIER_WORK)] + work
-                clock[wp.static(GRID_SHIFT)] = clock[wp.static(GRID_SHIFT)] + dt * middle
-                clock[wp.static(OLD_BARRIER_VELOCITY)] = new
-            clock[wp.static(BARRIER_IMPULSE_X)] = total
+        balance[wp.static(GRAVITY_IMPULSE_X)] = balance[wp.static(GRAVITY_IMPULSE_X)] + gx * weight
+        balance[wp.static(GRAVITY_IMPULSE_Y)] = balance[wp.static(GRAVITY_IMPULSE_Y)] + gy * weight
+        sound = wp.bool(True)
+        if MOVING:
+            sound = carry(bodies, grid, reactions, dt)
         # Points that left this step felt gravity in it: they are taken off afterwards.
-        clock[wp.static(ACTIVE_MASS_SOLID)] = clock[wp.static(INITIAL_MASS_SOLID)] - left[wp.static(LEFT_SOLID_MASS)]
-        clock[wp.static(ACTIVE_MASS_LIQUID)] = clock[wp.static(INITIAL_MASS_LIQUID)] - left[wp.static(LEFT_LIQUID_MASS)]
+        balance[wp.static(ACTIVE_MASS_SOLID)] = (
+            balance[wp.static(INITIAL_MASS_SOLID)] - left[wp.static(LEFT_SOLID_MASS)]
+        )
+        balance[wp.static(ACTIVE_MASS_LIQUID)] = (
+            balance[wp.static(INITIAL_MASS_LIQUID)] - left[wp.static(LEFT_LIQUID_MASS)]
+        )
         counters[wp.static(STEPS)] = counters[wp.static(STEPS)] + 1
         clock[wp.static(LARGEST_TIME_STEP)] = wp.max(clock[wp.static(LARGEST_TIME_STEP)], dt)
         clock[wp.static(SMALLEST_TIME_STEP)] = wp.min(clock[wp.static(SMALLEST_TIME_STEP)], dt)
@@ -141,14 +153,14 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         clock[wp.static(TIME)] = time
         speed = clock[wp.static(SPEED_MAX)]
         # The greatest speed passes over NaN; a NaN anywhere in a velocity makes a position NaN, which `advect` notices.
-        if not (speed < wp.static(FASTEST * FASTEST)) or not wp.isfinite(clock[wp.static(BARRIER_VELOCITY)]):
+        if not (speed < wp.static(FASTEST * FASTEST)) or not sound:
             counters[wp.static(DIVERGED)] = 1
         if counters[wp.static(DIVERGED)] != 0:
             go = wp.int32(0)
         if go == 1:
             choose_step(parameters, clock, counters)
             if DRIVEN:
-                drive(clock, times, velocities)
+                drive(bodies, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
         running[0] = go
 

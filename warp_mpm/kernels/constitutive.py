@@ -1,21 +1,19 @@
 """End of the step at the material points: position, strains, effective stress, pore pressure ("update stress last")."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
 from .elementary import make_elementary
 from .layout import (
-    BARRIER_VELOCITY,
     DIVERGED,
     GAPS_BOUNDED,
-    GRID_SHIFT,
     LEFT_ENERGY,
     LEFT_LIQUID_MASS,
     LEFT_MOMENTUM_X,
     LEFT_MOMENTUM_Y,
     LEFT_SOLID_MASS,
-    OLD_BARRIER_VELOCITY,
     POINTS_LEFT,
     POINTS_PUSHED,
     SPEED_MAX,
@@ -83,7 +81,7 @@ def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
 
 
 def make_constitutive(
-    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
+    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, bodies_of: Any, module: str
 ) -> SimpleNamespace:
     """Build the kernels `advect`, `update` and `bound` (over points).
 
@@ -110,14 +108,16 @@ def make_constitutive(
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
     PLASTICITY = effects.plasticity
-    GROUND = effects.ground != "none"
-    BARRIER = effects.barrier != "none"
+    BODIES = effects.bodies
+    Bodies = types.Bodies
+    set_back = bodies_of.set_back if BODIES else None
+    travel = bodies_of.travel if BODIES else None
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
-    MOVING = effects.barrier in ("sliding", "driven")
+    MOVING = effects.moving
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     SOLID_GAP = effects.smoothing_grid and effects.plasticity
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
@@ -167,8 +167,10 @@ def make_constitutive(
         points: Points,
         grid: Grid,
         parameters: Parameters,
+        bodies: Bodies,
         clock: wp.array(dtype=wp.float64),
         counters: wp.array(dtype=wp.int32),
+        limiters: wp.array(dtype=wp.float64),
         left: wp.array(dtype=wp.float64),
     ):
         """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
@@ -176,7 +178,7 @@ def make_constitutive(
         if read(points.inside, p) == 0:
             return
         time_step = F(clock[wp.static(TIME_STEP)])
-        shift = F(clock[wp.static(GRID_SHIFT)])
+        shift = F(grid.shift[0])
         x = read(points.position, p)
         if CORNERS:
             ci, cj, fx, fy = cell_of(x, shift, parameters)
@@ -203,28 +205,14 @@ def make_constitutive(
         else:
             v = read(points.velocity, p)
             x += time_step * V2(v[0], v[1])
-        # Barrier and grid as they will lie in the next step: whatever their speed, no point then reaches beyond them.
-        if MOVING:
-            middle = F(0.5) * (F(clock[wp.static(BARRIER_VELOCITY)]) + F(clock[wp.static(OLD_BARRIER_VELOCITY)]))
-            shift += time_step * middle
-        depth = F(-0.5) * parameters.spacing
-        if GROUND:
-            if x[1] < depth:
-                x[1] = depth
-                wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
-        if BARRIER:
-            seen = x - V2(shift, F(0.0))
-            face = wp.dot(parameters.face_normal, seen)
-            top = seen[1] - parameters.crest_height
-            back = wp.dot(parameters.back_normal, seen) - parameters.back_offset
-            if face < depth and top < depth and back < depth:
-                wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
-                if face >= top and face >= back:
-                    x += (depth - face) * parameters.face_normal
-                elif top >= back:
-                    x[1] += depth - top
-                else:
-                    x += (depth - back) * parameters.back_normal
+        if BODIES:
+            # Bodies and grid as they will lie in the next step: whatever their speed, no point reaches beyond them.
+            if MOVING:
+                if bodies.carrier >= 0:
+                    shift += travel(bodies, bodies.carrier, time_step)[0]
+            x, pushed = set_back(bodies, x, F(-0.5) * parameters.spacing, time_step)
+            if pushed > 0:
+                wp.atomic_add(counters, wp.static(POINTS_PUSHED), pushed)
 
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
@@ -248,7 +236,7 @@ def make_constitutive(
                 largest = room(read(points.smooth, p)[0])
                 if gap > largest:
                     write(points.solid_gap, p, largest)
-                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+                    wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     @wp.kernel(module=module)
     def update(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
@@ -330,7 +318,12 @@ def make_constitutive(
         write(points.volume, p, volume)
 
     @wp.kernel(module=module)
-    def bound(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+    def bound(
+        points: Points,
+        parameters: Parameters,
+        clock: wp.array(dtype=wp.float64),
+        limiters: wp.array(dtype=wp.float64),
+    ):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
         p = wp.tid()
         if read(points.inside, p) == 0:
@@ -343,12 +336,12 @@ def make_constitutive(
             gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
             speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
             wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
-            wp.atomic_add(clock, wp.static(VOIDS_CLOSED), wp.float64(1.0))
+            wp.atomic_add(limiters, wp.static(VOIDS_CLOSED), wp.float64(1.0))
         if LIQUID_GAP:
             if read(points.liquid_strain, p) > F(0.0):
                 largest = room(read(points.smooth, p)[0]) / parameters.porosity
                 if read(points.liquid_strain, p) > largest:
                     write(points.liquid_strain, p, largest)
-                    wp.atomic_add(clock, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+                    wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     return SimpleNamespace(advect=advect, update=update, bound=bound)

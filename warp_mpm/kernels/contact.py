@@ -1,7 +1,7 @@
-"""Contact of the flow with the ground, with side walls and with the barrier, for both phases.
+"""Contact of the flow with solid bodies, for both phases.
 
-A surface acts on single nodes (inclined faces: the nodes inside the solid and within half a cell of it) or on mirrored
-pairs of nodes (surfaces along the grid), where it sees the mean of both, which is the velocity at the surface itself.
+A body acts on single nodes or on mirrored pairs of nodes, where it sees the mean of both, which is the velocity at the
+surface itself; which nodes, with which normal and for which surface, is decided in `simulator.bodies.nodes` alone.
 Where the mixture approaches, both phases take the surface's normal velocity: nothing flows in or out. Where it leaves,
 it is free. Coulomb friction acts on the solid, whose normal force is the total one less what the liquid's pressure
 carries, and drag passes it on to the liquid. Reactions follow from the momentum change of both phases, Eq. (A14).
@@ -12,22 +12,12 @@ from typing import Any
 
 import warp as wp
 
-from .layout import (
-    BARRIER_VELOCITY,
-    BLOCK,
-    CEILING,
-    GRID_SHIFT,
-    GROUND,
-    LEFT_WALL,
-    RIGHT_WALL,
-    TIME_STEP,
-)
+from .layout import TIME_STEP
 
 
-def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build those of the kernels `ground` (workers on the blocks in use), `side_walls` (over rows), `ceiling` (over
-    columns), `collect` and `barrier` (over
-    contacts) that are called for, and the functions `respond` and `impulse` for the barrier's equation of motion."""
+def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernels `press` (over groups of places of contact), and `collect` and `push` (over places) where some
+    body slides, and the functions `respond` and `impulse` for its equation of motion."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2
@@ -35,12 +25,13 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Grid = types.Grid
     Parameters = types.Parameters
     Contact = types.Contact
+    Bodies = types.Bodies
+    surface_velocity_of = bodies_of.surface_velocity
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
     FRICTION = effects.friction
-    BARRIER_CARRIED = effects.barrier_friction and LIQUID
-    GROUND_CARRIED = effects.ground == "frictional" and LIQUID
+    CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
 
     @wp.func
@@ -143,195 +134,142 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
         wp.atomic_add(reactions, 2 * surface + 1, wp.float64(force[1]))
 
     @wp.func
-    def fixed_surface(
+    def rub(bodies: Bodies, surface: wp.int32) -> F:
+        """Friction coefficient of a surface."""
+        result = F(0.0)
+        if FRICTION:
+            result = bodies.friction[surface]
+        return result
+
+    @wp.func
+    def act(
+        contact: Contact,
+        e: wp.int32,
+        bodies: Bodies,
         grid: Grid,
         parameters: Parameters,
-        i: wp.int32,
-        j: wp.int32,
-        mi: wp.int32,
-        mj: wp.int32,
-        normal: V2,
-        friction: F,
         time_step: F,
-        surface: wp.int32,
         reactions: wp.array(dtype=wp.float64),
     ):
-        """A surface at rest between node (i, j) behind it and its mirror image (mi, mj); (i, j) again: no mirror."""
-        mass = grid.mass[i, j]
+        """What a place of contact does to its node, or to its node and its mirror image."""
+        node = contact.node[e]
+        surface = contact.surface[e]
+        mass = grid.mass[node[0], node[1]]
         if mass > F(0.0):
-            velocity = grid.velocity[i, j]
+            normal = contact.normal[e]
+            mirror = contact.mirror[e]
+            moving = surface_velocity_of(bodies, contact.body)
+            friction = rub(bodies, surface)
+            velocity = grid.velocity[node[0], node[1]]
             liquid_free = V2()
-            if GROUND_CARRIED:
-                liquid_free = grid.liquid_alone[i, j]
+            if CARRIED:
+                liquid_free = grid.liquid_alone[node[0], node[1]]
             pair = wp.bool(False)
-            if mi != i or mj != j:
-                other = grid.mass[mi, mj]
+            if mirror[0] >= 0:
+                other = grid.mass[mirror[0], mirror[1]]
                 if other > F(0.0):
-                    mean = F(0.5) * (velocity + grid.velocity[mi, mj])
+                    mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
                     # Where the surface is left but the node behind it is not, it acts alone on what lies behind.
-                    if leaves(velocity, normal, V2(), parameters) or not leaves(mean, normal, V2(), parameters):
+                    if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
                         pair = wp.bool(True)
                         both = F(4.0) * mass * other / (mass + other)
-                        if GROUND_CARRIED:
-                            liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mi, mj])
-                        change = respond(both, mean, liquid_free, normal, friction, V2(), parameters, time_step)
-                        add(grid, i, j, change * (F(0.5) * both / mass))
-                        add(grid, mi, mj, change * (F(0.5) * both / other))
+                        if CARRIED:
+                            liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mirror[0], mirror[1]])
+                        change = respond(both, mean, liquid_free, normal, friction, moving, parameters, time_step)
+                        add(grid, node[0], node[1], change * (F(0.5) * both / mass))
+                        add(grid, mirror[0], mirror[1], change * (F(0.5) * both / other))
                         record(reactions, surface, impulse(both, change, parameters))
             if not pair:
-                change = respond(mass, velocity, liquid_free, normal, friction, V2(), parameters, time_step)
-                add(grid, i, j, change)
+                change = respond(mass, velocity, liquid_free, normal, friction, moving, parameters, time_step)
+                add(grid, node[0], node[1], change)
                 record(reactions, surface, impulse(mass, change, parameters))
 
-    kernels: dict[str, Any] = {}
-
-    if effects.ground != "none":
-
-        @wp.kernel(module=module)
-        def ground(
-            grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
-        ):
-            worker = wp.tid()
+    @wp.kernel(module=module)
+    def press(
+        contact: Contact,
+        bodies: Bodies,
+        grid: Grid,
+        parameters: Parameters,
+        clock: wp.array(dtype=wp.float64),
+        reactions: wp.array(dtype=wp.float64),
+    ):
+        """A body whose velocity is known acts on the flow."""
+        group = wp.tid()
+        block = contact.block[group]
+        used = wp.bool(True)
+        if block >= 0:
+            bi = block / parameters.block_rows
+            used = grid.block[bi, block - bi * parameters.block_rows] != 0
+        if used:
             time_step = F(clock[wp.static(TIME_STEP)])
-            row = parameters.ground_row
-            up = V2(F(0.0), F(1.0))
-            friction = parameters.ground_friction
-            # The three rows that the ground concerns lie in one row of blocks.
-            for s in range(worker, grid.active_count[0], parameters.workers):
-                block = grid.active[s]
-                bi = block / parameters.block_rows
-                if block == bi * parameters.block_rows + row / wp.static(BLOCK):
-                    for a in range(wp.static(BLOCK)):
-                        i = bi * wp.static(BLOCK) + a
-                        fixed_surface(
-                            grid, parameters, i, row - 1, i, row, up, friction, time_step, wp.static(GROUND), reactions
-                        )
-                        fixed_surface(
-                            grid,
-                            parameters,
-                            i,
-                            row - 2,
-                            i,
-                            row - 2,
-                            up,
-                            friction,
-                            time_step,
-                            wp.static(GROUND),
-                            reactions,
-                        )
+            for e in range(contact.start[group], contact.start[group + 1]):
+                if contact.surface[e] >= 0:
+                    act(contact, e, bodies, grid, parameters, time_step, reactions)
 
-        kernels["ground"] = ground
+    kernels: dict[str, Any] = {"press": press}
 
-    if effects.side_walls:
+    if effects.sliding:
 
         @wp.kernel(module=module)
-        def side_walls(
-            grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
-        ):
-            """Smooth walls at rest. Seen from a grid that rides with a barrier they move, so each acts at the line of
-            cell corners nearest to it."""
-            j = wp.tid()
-            time_step = F(clock[wp.static(TIME_STEP)])
-            origin = parameters.left + F(clock[wp.static(GRID_SHIFT)])
-            none = F(0.0)
-            c = wp.int32(
-                wp.clamp((parameters.left_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9))
-            )
-            if c >= 2 and c < parameters.columns:
-                right = V2(F(1.0), F(0.0))
-                fixed_surface(grid, parameters, c - 1, j, c, j, right, none, time_step, wp.static(LEFT_WALL), reactions)
-                fixed_surface(
-                    grid, parameters, c - 2, j, c - 2, j, right, none, time_step, wp.static(LEFT_WALL), reactions
-                )
-            c = wp.int32(
-                wp.clamp((parameters.right_wall - origin) * parameters.inverse_spacing + F(0.5), none, F(2.0e9))
-            )
-            if c >= 1 and c < parameters.columns - 1:
-                left = V2(F(-1.0), F(0.0))
-                fixed_surface(grid, parameters, c, j, c - 1, j, left, none, time_step, wp.static(RIGHT_WALL), reactions)
-                fixed_surface(
-                    grid, parameters, c + 1, j, c + 1, j, left, none, time_step, wp.static(RIGHT_WALL), reactions
-                )
-
-        kernels["side_walls"] = side_walls
-
-    if effects.ceiling:
-
-        @wp.kernel(module=module)
-        def ceiling(
-            grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64), reactions: wp.array(dtype=wp.float64)
-        ):
-            """Smooth wall above, on the line of cell corners nearest to it."""
-            i = wp.tid()
-            time_step = F(clock[wp.static(TIME_STEP)])
-            row = parameters.ceiling_row
-            down = V2(F(0.0), F(-1.0))
-            none = F(0.0)
-            fixed_surface(grid, parameters, i, row + 1, i, row, down, none, time_step, wp.static(CEILING), reactions)
-            fixed_surface(
-                grid, parameters, i, row + 2, i, row + 2, down, none, time_step, wp.static(CEILING), reactions
-            )
-
-        kernels["ceiling"] = ceiling
-
-    if effects.barrier != "none":
-
-        @wp.kernel(module=module)
-        def collect(contact: Contact, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-            """What the barrier's surface sees of the flow: inertia (zero: nothing there) and velocities."""
+        def collect(contact: Contact, bodies: Bodies, grid: Grid, parameters: Parameters):
+            """What a sliding body's surface sees of the flow: inertia (zero: nothing there) and velocities."""
             e = wp.tid()
             node = contact.node[e]
             mirror = contact.mirror[e]
-            mass = grid.mass[node[0], node[1]]
+            mass = F(0.0)
+            if contact.surface[e] >= 0:
+                mass = grid.mass[node[0], node[1]]
             if mass > F(0.0):
                 velocity = grid.velocity[node[0], node[1]]
                 liquid_free = V2()
-                if BARRIER_CARRIED:
+                if CARRIED:
                     liquid_free = grid.liquid_alone[node[0], node[1]]
                 pair = wp.int32(0)
                 if mirror[0] >= 0:
                     other = grid.mass[mirror[0], mirror[1]]
                     if other > F(0.0):
-                        moving = V2(F(clock[wp.static(BARRIER_VELOCITY)]), F(0.0))
+                        moving = surface_velocity_of(bodies, contact.body)
                         normal = contact.normal[e]
                         mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
                         if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
                             pair = wp.int32(1)
                             mass = F(4.0) * mass * other / (mass + other)
                             velocity = mean
-                            if BARRIER_CARRIED:
+                            if CARRIED:
                                 liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mirror[0], mirror[1]])
                 contact.pair[e] = pair
                 contact.velocity[e] = velocity
-                if BARRIER_CARRIED:
+                if CARRIED:
                     contact.liquid_free[e] = liquid_free
             contact.mass[e] = mass
 
         @wp.kernel(module=module)
-        def barrier(
+        def push(
             contact: Contact,
+            bodies: Bodies,
             grid: Grid,
             parameters: Parameters,
             clock: wp.array(dtype=wp.float64),
             reactions: wp.array(dtype=wp.float64),
         ):
+            """A sliding body acts on the flow, as its equation of motion has found."""
             e = wp.tid()
             mass = contact.mass[e]
             if mass > F(0.0):
                 time_step = F(clock[wp.static(TIME_STEP)])
-                surface_velocity = V2(F(clock[wp.static(BARRIER_VELOCITY)]), F(0.0))
                 node = contact.node[e]
                 mirror = contact.mirror[e]
+                surface = contact.surface[e]
                 liquid_free = V2()
-                if BARRIER_CARRIED:
+                if CARRIED:
                     liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    contact.friction[e],
-                    surface_velocity,
+                    rub(bodies, surface),
+                    surface_velocity_of(bodies, contact.body),
                     parameters,
                     time_step,
                 )
@@ -340,9 +278,9 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     add(grid, mirror[0], mirror[1], change * (F(0.5) * mass / grid.mass[mirror[0], mirror[1]]))
                 else:
                     add(grid, node[0], node[1], change)
-                record(reactions, contact.surface[e], impulse(mass, change, parameters))
+                record(reactions, surface, impulse(mass, change, parameters))
 
         kernels["collect"] = collect
-        kernels["barrier"] = barrier
+        kernels["push"] = push
 
-    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse)
+    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse, rub=rub)

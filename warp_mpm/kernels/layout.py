@@ -15,44 +15,37 @@ from typing import Any
 import warp as wp
 
 from ..effects import Effects
+from ..simulator.bodies.kernels import body_fields, contact_fields
 
 BLOCK_SHIFT = 3
 BLOCK = 1 << BLOCK_SHIFT
 """Nodes along the side of a block, the unit in which the grid is switched on and off."""
 
-# Entries of the clock, a float64 array: the state of time, of the grid and of the barrier that lives on the device.
+# Entries of the clock, a float64 array: time, and what sets its step.
 TIME = 0
 TARGET = 1
 TIME_STEP = 2
 SPEED_MAX = 3
 """Greatest square of a speed, of either phase [m2/s2]."""
-GRID_SHIFT = 4
-"""Displacement of the grid (and of the barrier, with which it rides) since the start [m]."""
-BARRIER_VELOCITY = 5
-BARRIER_WORK = 6
-"""Work of the flow on the barrier [J/m]."""
-BASE_FRICTION_WORK = 7
-BASE_FRICTION_IMPULSE = 8
-"""Time integral of the friction force at the barrier's base, positive when it acts downstream [N s/m]."""
-EXTERNAL_IMPULSE = 9
-EXTERNAL_FORCE = 10
-GRAVITY_IMPULSE_X = 11
-GRAVITY_IMPULSE_Y = 12
-ACTIVE_MASS_SOLID = 13
-ACTIVE_MASS_LIQUID = 14
-LARGEST_TIME_STEP = 15
-SMALLEST_TIME_STEP = 16
-DRIVEN_WORK = 17
-EXTERNAL_WORK = 18
-OLD_BARRIER_VELOCITY = 19
-BARRIER_IMPULSE_X = 20
-INITIAL_MASS_SOLID = 21
-INITIAL_MASS_LIQUID = 22
-GAPS_BOUNDED = 23
+LARGEST_TIME_STEP = 4
+SMALLEST_TIME_STEP = 5
+CLOCK_SIZE = 6
+
+# Entries of the balance, a float64 array: what gravity gave to the flow, and the mass on which it acts.
+GRAVITY_IMPULSE_X = 0
+GRAVITY_IMPULSE_Y = 1
+ACTIVE_MASS_SOLID = 2
+ACTIVE_MASS_LIQUID = 3
+INITIAL_MASS_SOLID = 4
+INITIAL_MASS_LIQUID = 5
+BALANCE_SIZE = 6
+
+# Entries of the limiters, a float64 array: how often each acted, once per step and point.
+GAPS_BOUNDED = 0
 """Times that the gap of a point was cut to the room that its neighbours leave."""
-VOIDS_CLOSED = 24
+VOIDS_CLOSED = 1
 """Times that a point went into a step with the volume of its grains and no voids."""
-CLOCK_SIZE = 25
+LIMITERS_SIZE = 2
 
 FASTEST = 1.0e5
 """Speed [m/s] beyond which a run has diverged, whatever the scene."""
@@ -69,16 +62,6 @@ POINTS_LEFT = 7
 POINTS_PUSHED = 8
 """Times that a point deeper than half a cell in a solid was set back to that depth."""
 COUNTERS_SIZE = 9
-
-# Surfaces on which reactions are recorded: impulse on the surface in x and y, each a pair in one float64 array.
-FACE = 0
-TOP = 1
-BACK = 2
-GROUND = 3
-LEFT_WALL = 4
-RIGHT_WALL = 5
-CEILING = 6
-SURFACES = 7
 
 # Ledger sums, a float64 array written by the ledger kernel.
 LEDGER_KINETIC = 0
@@ -161,6 +144,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
+        "shift": array(dtype=wp.float64),  # displacement of the grid along x since the start [m]
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
@@ -233,44 +217,15 @@ def layout(effects: Effects) -> SimpleNamespace:
             "relaxation_rate",
         ):
             parameters[name] = scalar
-    if effects.liquid and effects.barrier != "none":
-        parameters["crest_end"] = wp.float64  # x of the crest's downstream corner at t = 0
+    if effects.liquid and effects.bodies:
+        parameters["crest_end"] = wp.float64  # x of the downstream end of a crest at t = 0; far away: there is none
+        parameters["crest_body"] = wp.int32  # whose crest
     if effects.two_phase:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
         parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
-    if effects.ground != "none":
-        parameters["ground_row"] = wp.int32  # first row of nodes above the ground
-        parameters["ground_friction"] = scalar
-    if effects.side_walls:
-        parameters["left_wall"] = scalar  # position [m]; far outside the grid: open
-        parameters["right_wall"] = scalar
-    if effects.ceiling:
-        parameters["ceiling_row"] = wp.int32  # last row of nodes below the upper wall
-    if effects.barrier != "none":
-        parameters["face_normal"] = V2
-        parameters["crest_height"] = scalar  # far above: a wall without end
-        parameters["back_normal"] = V2
-        parameters["back_offset"] = scalar
-    if effects.barrier == "sliding":
-        parameters["barrier_mass"] = wp.float64
-        parameters["barrier_weight"] = wp.float64
-        parameters["barrier_pull"] = wp.float64  # gravity's component along the ground, times the mass
-        parameters["base_friction"] = wp.float64
-
-    contact: dict[str, Any] = {
-        "node": array(dtype=wp.vec2i),
-        "mirror": array(dtype=wp.vec2i),  # (-1, -1): none
-        "normal": array(dtype=V2),
-        "surface": array(dtype=wp.int32),
-        "friction": array(dtype=scalar),
-        # Gathered each step, for the barrier's equation of motion.
-        "pair": array(dtype=wp.int32),  # 1: acts with its mirror image
-        "mass": array(dtype=scalar),
-        "velocity": array(dtype=V),
-    }
-    if effects.barrier_friction and effects.liquid:
-        contact["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
+    bodies = body_fields(effects, scalar, V2, V4)
+    contact = contact_fields(effects, scalar, V2, V) if effects.bodies else {}
 
     return SimpleNamespace(
         effects=effects,
@@ -284,8 +239,10 @@ def layout(effects: Effects) -> SimpleNamespace:
         Points=_structure("Points", points),
         Grid=_structure("Grid", grid),
         Parameters=_structure("Parameters", parameters),
+        Bodies=_structure("Bodies", bodies),
         Contact=_structure("Contact", contact),
         point_fields=points,
         grid_fields=grid,
+        body_fields=bodies,
         contact_fields=contact,
     )

@@ -6,7 +6,6 @@ import warp as wp
 
 from .elementary import make_elementary
 from .layout import (
-    GRID_SHIFT,
     LEDGER_ELASTIC,
     LEDGER_GRAVITATIONAL,
     LEDGER_KINETIC,
@@ -36,7 +35,9 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     RELAXATION = effects.pressure_relaxation
-    BARRIER = effects.barrier != "none"
+    BODIES = effects.bodies
+    MOVING = effects.moving
+    Bodies = types.Bodies
 
     one = wp.constant(wp.float64(1.0))
 
@@ -99,9 +100,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         return result
 
     @wp.kernel(module=module)
-    def ledger(
-        points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64), sums: wp.array(dtype=wp.float64)
-    ):
+    def ledger(points: Points, parameters: Parameters, bodies: Bodies, sums: wp.array(dtype=wp.float64)):
         solid_mass = wp.float64(0.0)
         liquid_mass = wp.float64(0.0)
         kinetic_energy = wp.float64(0.0)
@@ -117,8 +116,10 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         not_finite = wp.float64(0.0)
         per_bulk_modulus = one / wp.float64(parameters.bulk_modulus)
         if LIQUID:
-            if BARRIER:
-                crest_end = parameters.crest_end + clock[wp.static(GRID_SHIFT)]
+            if BODIES:
+                crest_end = parameters.crest_end
+                if MOVING:
+                    crest_end += bodies.displacement[parameters.crest_body][0]
             per_liquid_modulus = one / wp.float64(parameters.liquid_bulk_modulus)
         # Each thread sums for itself and adds to the common sums once.
         p = wp.tid()
@@ -171,7 +172,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     )
                     pressure_max = larger(pressure_max, wp.float64(pressure))
                     upstream = wp.bool(True)
-                    if BARRIER:
+                    if BODIES:
                         upstream = wp.float64(read(points.position, p)[0]) < crest_end
                     if upstream:
                         if RELAXATION:

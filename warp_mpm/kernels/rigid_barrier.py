@@ -1,20 +1,10 @@
-"""Equation of motion of a barrier that slides on its base, solved together with the contact."""
+"""Equation of motion of a body that slides on its base, solved together with the contact."""
 
 from types import SimpleNamespace
 
 import warp as wp
 
-from .layout import (
-    BARRIER_ITERATIONS,
-    BARRIER_UNCONVERGED,
-    BARRIER_VELOCITY,
-    BASE_FRICTION_IMPULSE,
-    BASE_FRICTION_WORK,
-    EXTERNAL_FORCE,
-    EXTERNAL_IMPULSE,
-    EXTERNAL_WORK,
-    TIME_STEP,
-)
+from .layout import BARRIER_ITERATIONS, BARRIER_UNCONVERGED, TIME_STEP
 
 MAX_ITERATIONS = 120
 
@@ -24,10 +14,11 @@ impulse jumps at some velocity of the barrier, at which a node is let go; only h
 
 
 def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module: str) -> SimpleNamespace:
-    """Build the kernel `slide` (one thread): the barrier's velocity at the end of the step.
+    """Build the kernel `slide` (one thread): the velocity at the end of the step of the
+    body that `contact` belongs to.
 
-    The flow's reaction depends on that velocity, so both are found together: a barrier far lighter than the flow is as
-    stable as a heavy one. With v the velocity sought, J(v) the flow's impulse on the barrier, W its weight,
+    The flow's reaction depends on that velocity, so both are found together: a body far lighter than the flow is as
+    stable as a heavy one. With v the velocity sought, J(v) the flow's impulse on the body, W its weight,
 
         m_2 (v - v_2) = J_x(v) + F_ext dt - sign(v) tan(delta_b) max(0, W dt - J_y(v)),
 
@@ -38,21 +29,23 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     F = types.scalar
     V2 = types.V2
     Contact = types.Contact
+    Bodies = types.Bodies
     Parameters = types.Parameters
     respond = contact.respond
     impulse = contact.impulse
-    CARRIED = types.effects.barrier_friction and types.effects.liquid
+    rub = contact.rub
+    CARRIED = types.effects.friction and types.effects.liquid
     # Relative width of a bracket that cannot be closed any further, as impulses are rounded to the scalar's precision,
     # and of one in which the velocity counts as found.
     CLOSED, FOUND = (1.0e-15, 1.0e-10) if types.effects.precision == "float64" else (1.0e-7, 1.0e-4)
 
     @wp.func
     def flow_impulse(
-        contact: Contact, count: wp.int32, velocity: wp.float64, parameters: Parameters, time_step: F
+        contact: Contact, bodies: Bodies, velocity: wp.float64, parameters: Parameters, time_step: F
     ) -> wp.vec2d:
         total = wp.vec2d()
         surface_velocity = V2(F(velocity), F(0.0))
-        for e in range(count):
+        for e in range(contact.mass.shape[0]):
             mass = contact.mass[e]
             if mass > F(0.0):
                 liquid_free = V2()
@@ -63,7 +56,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    contact.friction[e],
+                    rub(bodies, contact.surface[e]),
                     surface_velocity,
                     parameters,
                     time_step,
@@ -75,7 +68,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     @wp.kernel(module=module)
     def slide(
         contact: Contact,
-        count: wp.int32,
+        bodies: Bodies,
         parameters: Parameters,
         clock: wp.array(dtype=wp.float64),
         counters: wp.array(dtype=wp.int32),
@@ -83,15 +76,16 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
         zero = wp.float64(0.0)
         dt = clock[wp.static(TIME_STEP)]
         time_step = F(dt)
-        old = clock[wp.static(BARRIER_VELOCITY)]
-        mass = parameters.barrier_mass
-        weight = parameters.barrier_weight * dt
-        external = (clock[wp.static(EXTERNAL_FORCE)] + parameters.barrier_pull) * dt
+        body = contact.body
+        old = bodies.velocity[body][0]
+        mass = bodies.mass[body]
+        weight = bodies.weight[body] * dt
+        external = (bodies.external_force[body] + bodies.pull[body]) * dt
         momentum = mass * old + external
 
-        j = flow_impulse(contact, count, zero, parameters, time_step)
+        j = flow_impulse(contact, bodies, zero, parameters, time_step)
         drive = momentum + j[0]
-        friction = parameters.base_friction * wp.max(weight - j[1], zero)
+        friction = bodies.base_friction[body] * wp.max(weight - j[1], zero)
         new = zero
         if wp.abs(drive) > friction:
             sign = wp.sign(drive)
@@ -115,8 +109,8 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
                     v = (low * high_residual - high * low_residual) / (high_residual - low_residual)
                 else:
                     v = high
-                j = flow_impulse(contact, count, sign * v, parameters, time_step)
-                friction = parameters.base_friction * wp.max(weight - j[1], zero)
+                j = flow_impulse(contact, bodies, sign * v, parameters, time_step)
+                friction = bodies.base_friction[body] * wp.max(weight - j[1], zero)
                 residual = sign * (momentum + j[0]) - friction - mass * v
                 if residual > zero:
                     low = v
@@ -145,11 +139,9 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
             friction = momentum + j[0] - mass * new
         else:
             friction = drive
-        clock[wp.static(BARRIER_VELOCITY)] = new
+        bodies.velocity[body] = wp.vec2d(new, zero)
         middle = wp.float64(0.5) * (old + new)
-        clock[wp.static(BASE_FRICTION_IMPULSE)] = clock[wp.static(BASE_FRICTION_IMPULSE)] - friction
-        clock[wp.static(BASE_FRICTION_WORK)] = clock[wp.static(BASE_FRICTION_WORK)] + friction * middle
-        clock[wp.static(EXTERNAL_IMPULSE)] = clock[wp.static(EXTERNAL_IMPULSE)] + external
-        clock[wp.static(EXTERNAL_WORK)] = clock[wp.static(EXTERNAL_WORK)] + external * middle
+        bodies.base_impulse[body] = bodies.base_impulse[body] - friction
+        bodies.base_work[body] = bodies.base_work[body] + friction * middle
 
     return SimpleNamespace(slide=slide)

@@ -1,6 +1,7 @@
 """Transfer between material points and grid: clear, scatter (points to grid), gather (grid to points)."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -8,7 +9,6 @@ from .elementary import make_elementary
 from .layout import (
     BLOCK,
     BLOCK_SHIFT,
-    GRID_SHIFT,
     SPEED_MAX,
     TIME_STEP,
 )
@@ -18,7 +18,7 @@ EVEN = 0.1
 
 
 def make_transfer(
-    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, module: str
+    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, bodies_of: Any, module: str
 ) -> SimpleNamespace:
     """Build the kernels `clear` (workers on the blocks in use), `forget`, `scatter` and `gather` (over points)."""
     effects = types.effects
@@ -47,8 +47,9 @@ def make_transfer(
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
-    GROUND_FRICTION = effects.ground == "frictional"
-    BARRIER_FRICTION = effects.barrier_friction
+    near = bodies_of.near if LIQUID_ALONE else None
+    displaced = bodies_of.displaced if LIQUID_ALONE else None
+    Bodies = types.Bodies
     POROSITY = effects.porosity_update
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     pressure_at = pore.pressure
@@ -94,7 +95,7 @@ def make_transfer(
                 grid.active[place] = block
 
     @wp.kernel(module=module)
-    def scatter(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, clock: wp.array(dtype=wp.float64)):
         """Mass, momentum and internal force of the points to the nodes, per unit of each phase's density.
 
         Internal forces per node: solid -sum V (sigma' - (1 - n) p I) grad w, liquid +sum V n p grad w, with p
@@ -104,7 +105,7 @@ def make_transfer(
         if read(points.inside, p) == 0:
             return
         x = read(points.position, p)
-        shift = F(clock[wp.static(GRID_SHIFT)])
+        shift = F(grid.shift[0])
         ci, cj, fx, fy = cell_of(x, shift, parameters)
         first = (ci - 1) * parameters.rows + cj - 1
         wx = weights(fx)
@@ -200,18 +201,10 @@ def make_transfer(
             rubbed = wp.bool(False)
             # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
-            if GROUND_FRICTION:
-                if cj - 2 <= parameters.ground_row:
-                    rubbed = wp.bool(True)
-            if BARRIER_FRICTION:
-                seen = x - V2(shift, F(0.0))
-                reach = F(3.0) * parameters.spacing
-                if (
-                    wp.dot(parameters.face_normal, seen) < reach
-                    and seen[1] - parameters.crest_height < reach
-                    and wp.dot(parameters.back_normal, seen) - parameters.back_offset < reach
-                ):
-                    rubbed = wp.bool(True)
+            for body in range(bodies.count):
+                if bodies.rubs[body] == 1:
+                    if near(bodies, body, x - displaced(bodies, body), F(3.0) * parameters.spacing):
+                        rubbed = wp.bool(True)
             if rubbed:
                 alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.true_liquid_density
                 share = F(1.0)
@@ -252,7 +245,7 @@ def make_transfer(
         if read(points.inside, p) == 0:
             return
         x = read(points.position, p)
-        shift = F(clock[wp.static(GRID_SHIFT)])
+        shift = F(grid.shift[0])
         time_step = F(clock[wp.static(TIME_STEP)])
         ci, cj, fx, fy = cell_of(x, shift, parameters)
         first = (ci - 1) * parameters.rows + cj - 1

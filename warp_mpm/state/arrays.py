@@ -1,32 +1,23 @@
-"""The arrays of a simulation on its device: material points, grid, contact nodes and clock, at the start of a scene."""
+"""The arrays of a simulation on its device: material points, grid and clock, at the start of a scene."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from ..discretization import MaterialPoints
 from ..effects import Effects
-from ..grid import GridLayout, contact_nodes, open_corner_volumes
+from ..grid import GridLayout
 from ..kernels import layout as at
-from ..scenario import Barrier, Prescribed, Scenario
-
-
-@dataclass(frozen=True)
-class Group:
-    """Arrays that kernels take together."""
-
-    structure: Any
-    """The Warp structure that holds them."""
-    arrays: dict[str, Any]
-    """The same, by name."""
+from ..scenario import Scenario
+from ..simulator.bodies import Body
+from ..simulator.bodies.arrays import Group, filled
+from ..simulator.bodies.room import open_corner_volumes
 
 
 def point_arrays(
@@ -50,74 +41,45 @@ def point_arrays(
     }
     if effects.liquid:
         given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
-    return _filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
+    return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
 
 
 def grid_arrays(
-    scenario: Scenario, effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
+    bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
 ) -> Group:
     """Nodes, corners of the smoothing grid, and the list of blocks in use."""
     blocks = (grid.columns // at.BLOCK, grid.rows // at.BLOCK)
     shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.columns, grid.rows))
-    shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1}
+    shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 1}
     given = {}
     if effects.smoothing_grid:
-        given["corner_room"] = 1.0 / open_corner_volumes(scenario, grid)
+        given["corner_room"] = 1.0 / open_corner_volumes(bodies, grid)
     if effects.density_correction:
-        given["corner_space"] = 1.0 / open_corner_volumes(scenario, grid, depth_in_cells=0.5)
-    return _filled(types.Grid(), types.grid_fields, given, shapes, device)
+        given["corner_space"] = 1.0 / open_corner_volumes(bodies, grid, depth_in_cells=0.5)
+    return filled(types.Grid(), types.grid_fields, given, shapes, device)
 
 
-def contact_arrays(barrier: Barrier, types: SimpleNamespace, grid: GridLayout, *, device: Any) -> Group:
-    """Nodes through which the barrier acts, and what is gathered there in a step."""
-    nodes = contact_nodes(barrier, grid)
-    given: dict[str, Any] = {
-        "node": nodes.node,
-        "mirror": nodes.mirror,
-        "normal": nodes.normal,
-        "surface": nodes.surface,
-        "friction": nodes.friction,
-    }
-    shapes = dict.fromkeys(types.contact_fields, len(nodes.node))
-    return _filled(types.Contact(), types.contact_fields, given, shapes, device)
-
-
-def clock_arrays(scenario: Scenario, effects: Effects, initial: MaterialPoints, *, device: Any) -> dict[str, Any]:
-    """Clock, counters, impulses, sums and the prescribed motion, by their names; entries as in `kernels.layout`."""
+def clock_arrays(
+    scenario: Scenario, effects: Effects, initial: MaterialPoints, *, surfaces: int, device: Any
+) -> dict[str, Any]:
+    """Clock, counters, balance, limiters, impulses on the surfaces and sums, by their names; entries as in
+    `kernels.layout`."""
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.SMALLEST_TIME_STEP] = math.inf
     clock[at.SPEED_MAX] = scenario.flow.speed**2
     solid, liquid = float(initial.solid_mass.sum()), float(initial.liquid_mass.sum())
     if not effects.two_phase:
         solid, liquid = solid + liquid, 0.0
-    clock[at.INITIAL_MASS_SOLID] = clock[at.ACTIVE_MASS_SOLID] = solid
-    clock[at.INITIAL_MASS_LIQUID] = clock[at.ACTIVE_MASS_LIQUID] = liquid
-    times, velocities = np.zeros(1), np.zeros(1)
-    if scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed):
-        motion = scenario.barrier.motion
-        times, velocities = np.array(motion.times_s), np.array(motion.velocities_m_per_s)
+    balance = np.zeros(at.BALANCE_SIZE)
+    balance[at.INITIAL_MASS_SOLID] = balance[at.ACTIVE_MASS_SOLID] = solid
+    balance[at.INITIAL_MASS_LIQUID] = balance[at.ACTIVE_MASS_LIQUID] = liquid
     return {
         "clock": wp.array(clock, dtype=wp.float64, device=device),
         "counters": wp.zeros(at.COUNTERS_SIZE, dtype=wp.int32, device=device),
         "running": wp.zeros(1, dtype=wp.int32, device=device),
-        "reactions": wp.zeros(2 * at.SURFACES, dtype=wp.float64, device=device),
+        "balance": wp.array(balance, dtype=wp.float64, device=device),
+        "limiters": wp.zeros(at.LIMITERS_SIZE, dtype=wp.float64, device=device),
+        "reactions": wp.zeros(2 * surfaces, dtype=wp.float64, device=device),
         "left": wp.zeros(at.LEFT_SIZE, dtype=wp.float64, device=device),
         "sums": wp.zeros(at.LEDGER_SIZE, dtype=wp.float64, device=device),
-        "times": wp.array(times, dtype=wp.float64, device=device),
-        "velocities": wp.array(velocities, dtype=wp.float64, device=device),
     }
-
-
-def _filled(
-    structure: Any, fields: Mapping[str, Any], given: Mapping[str, NDArray[Any]], shapes: Mapping[str, Any], device: Any
-) -> Group:
-    """The structure with an array for each of its fields: what is given, else zeros of the shape."""
-    arrays = {}
-    for name, field in fields.items():
-        if name in given:
-            array = wp.array(given[name], dtype=field.dtype, device=device)
-        else:
-            array = wp.zeros(shapes[name], dtype=field.dtype, device=device)
-        setattr(structure, name, array)
-        arrays[name] = array
-    return Group(structure, arrays)

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 from ..effects import Effects
-from ..grid import GridLayout, barrier_planes
+from ..grid import GridLayout
 from ..kernels import layout as at
 from ..kernels.mohr_coulomb import yield_constants
-from ..scenario import STANDARD_GRAVITY, Scenario, Sliding, Trapezoid
+from ..scenario import STANDARD_GRAVITY, Scenario, Trapezoid
+from ..simulator.bodies import Body
+from ..simulator.bodies.of_scene import BARRIER
+from ..simulator.bodies.outline import ENDLESS
 from ..time_step import StepLimits
 
 
 def kernel_parameters(
-    scenario: Scenario, effects: Effects, types: SimpleNamespace, *, grid: GridLayout, limits: StepLimits, workers: int
+    scenario: Scenario,
+    effects: Effects,
+    types: SimpleNamespace,
+    *,
+    bodies: Sequence[Body],
+    grid: GridLayout,
+    limits: StepLimits,
+    workers: int,
 ) -> Any:
     """The kernels' `Parameters`; those of an effect that is absent have no field there.
 
@@ -23,6 +34,7 @@ def kernel_parameters(
         scenario: the scene.
         effects: its effects.
         types: of the kernels, from `layout`.
+        bodies: all that the flow meets.
         grid: from `fit_grid`.
         limits: on the time step.
         workers: threads that share the blocks of the grid in use.
@@ -30,9 +42,8 @@ def kernel_parameters(
     values = _grid_and_clock(scenario, grid, limits, workers) | _skeleton(scenario, effects, limits)
     if effects.liquid:
         values |= _liquid(scenario, effects, limits)
-    values |= _edges(scenario, effects, grid)
-    if scenario.barrier is not None:
-        values |= _barrier(scenario, effects)
+    if effects.liquid and effects.bodies:
+        values |= _crest(scenario, bodies)
     parameters = types.Parameters()
     for name, value in values.items():
         setattr(parameters, name, types.V2(*value) if isinstance(value, tuple) else value)
@@ -107,45 +118,11 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
     return values
 
 
-def _edges(scenario: Scenario, effects: Effects, grid: GridLayout) -> dict[str, Any]:
-    domain = scenario.domain
-    values: dict[str, Any] = {}
-    if scenario.ground is not None:
-        values |= {"ground_row": grid.ground_row, "ground_friction": scenario.ground.friction}
-    if effects.ceiling:
-        above = grid.rows - 4 if domain.top_m is None else round((domain.top_m - grid.bottom) / grid.spacing)
-        values["ceiling_row"] = above - 1
-    if effects.side_walls:
-        far = 1e6 * grid.spacing * grid.columns
-        x_right = grid.left + grid.columns * grid.spacing
-        left = domain.left_m if domain.left_m is not None else grid.left + 4 * grid.spacing
-        right = domain.right_m if domain.right_m is not None else x_right - 4 * grid.spacing
-        values["left_wall"] = left if domain.left_edge == "wall" else -far
-        values["right_wall"] = right if domain.right_edge == "wall" else far
-    return values
-
-
-def _barrier(scenario: Scenario, effects: Effects) -> dict[str, Any]:
+def _crest(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, Any]:
+    """Where the pore pressure counts as loading the barrier: upstream of its crest's end."""
+    names = [body.name for body in bodies]
     barrier = scenario.barrier
-    assert barrier is not None
-    planes = {surface: (normal, offset) for surface, normal, offset in barrier_planes(barrier)}
-    nowhere = ((0.0, 1.0), 1e30)
-    values: dict[str, Any] = {
-        "face_normal": planes[at.FACE][0],
-        "crest_height": planes.get(at.TOP, nowhere)[1],
-        "back_normal": planes.get(at.BACK, nowhere)[0],
-        "back_offset": planes.get(at.BACK, nowhere)[1],
-    }
-    if effects.liquid:
-        values["crest_end"] = barrier.shape.polygon[2, 0] if isinstance(barrier.shape, Trapezoid) else 0.0
-    if effects.barrier == "sliding":
-        mass = barrier.mass
-        assert mass is not None
-        assert isinstance(barrier.motion, Sliding)
-        values |= {
-            "barrier_mass": mass,
-            "barrier_weight": -mass * scenario.gravity.vector[1],
-            "barrier_pull": mass * scenario.gravity.vector[0],
-            "base_friction": barrier.motion.base_friction_coefficient,
-        }
-    return values
+    if barrier is None:
+        return {"crest_end": ENDLESS, "crest_body": 0}
+    end = barrier.shape.polygon[2, 0] if isinstance(barrier.shape, Trapezoid) else 0.0
+    return {"crest_end": end, "crest_body": names.index(BARRIER)}

@@ -8,14 +8,19 @@ from dataclasses import dataclass
 
 from ..effects import Effects
 from ..kernels import layout as at
+from ..simulator.bodies import Body, Sliding
 
 
 @dataclass(frozen=True)
 class Totals:
-    """Sums since t = 0, of which forces are the differences; entries as in `kernels.layout`."""
+    """Sums since t = 0, of which forces are the differences."""
 
-    clock: list[float]
+    time: float
+    """[s]."""
     reactions: list[float]
+    """Impulse of the flow on each surface along x and y, one after the other [N s/m]."""
+    base_impulse: float = 0.0
+    """Of friction at the barrier's base [N s/m]."""
     seepage_power: float = 0.0
     """Rate at which gravity works on liquid that moves relative to the skeleton, at this time [W/m]."""
     seepage_work: float = 0.0
@@ -27,10 +32,25 @@ class Constants:
     """What samples need to know of a scene."""
 
     effects: Effects
-    barrier_mass: float | None
-    """[kg/m]; None unless the barrier slides."""
-    barrier_weight: float | None
-    """[N/m]; None unless the barrier slides."""
+    bodies: Sequence[Body]
+    barrier: int | None
+    """Number of the barrier among the bodies."""
+    gravity: tuple[float, float]
+    """[m/s2]."""
+
+
+@dataclass(frozen=True)
+class BarrierNow:
+    """The barrier's motion at the time of a sample."""
+
+    displacement: float = 0.0
+    """[m]."""
+    velocity: float = 0.0
+    """[m/s]."""
+    work: float = 0.0
+    """Of the flow on it since t = 0 [J/m]."""
+    base_work: float = 0.0
+    """That friction at its base has taken [J/m]."""
 
 
 def sample(
@@ -38,6 +58,9 @@ def sample(
     now: Totals,
     last: Totals,
     *,
+    barrier: BarrierNow,
+    balance: Sequence[float],
+    clock: Sequence[float],
     sums: Sequence[float],
     left: Sequence[float],
     initial_momentum: Sequence[float],
@@ -47,43 +70,46 @@ def sample(
     Args:
         constants: of the scene.
         now, last: totals now and at the last sample.
+        barrier: its motion; of no matter where there is none.
+        balance: what gravity gave to the flow.
+        clock: for the time step.
         sums: of the ledger.
         left: what has left the domain.
         initial_momentum: of the flow along x and y [N s/m].
     """
-    effects, clock, reactions = constants.effects, now.clock, now.reactions
-    elapsed = clock[at.TIME] - last.clock[at.TIME]
+    effects, reactions = constants.effects, now.reactions
+    elapsed = now.time - last.time
     rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
     forces = [(after - before) * rate for after, before in zip(reactions, last.reactions, strict=True)]
-    values = {"time": clock[at.TIME]}
+    values = {"time": now.time}
     momentum_x, momentum_y = sums[at.LEDGER_MOMENTUM_X], sums[at.LEDGER_MOMENTUM_Y]
-    residual_x = momentum_x - initial_momentum[0] - clock[at.GRAVITY_IMPULSE_X] + left[at.LEFT_MOMENTUM_X]
-    residual_y = momentum_y - initial_momentum[1] - clock[at.GRAVITY_IMPULSE_Y] + left[at.LEFT_MOMENTUM_Y]
+    residual_x = momentum_x - initial_momentum[0] - balance[at.GRAVITY_IMPULSE_X] + left[at.LEFT_MOMENTUM_X]
+    residual_y = momentum_y - initial_momentum[1] - balance[at.GRAVITY_IMPULSE_Y] + left[at.LEFT_MOMENTUM_Y]
     residual_x += sum(reactions[0::2])
     residual_y += sum(reactions[1::2])
-    if effects.barrier != "none":
+    number = 0
+    for body in constants.bodies:
+        for surface in body.surfaces:
+            if not body.edge:
+                values[f"{surface.name}_force_x"] = forces[2 * number]
+                values[f"{surface.name}_force_y"] = forces[2 * number + 1]
+            number += 1
+    if constants.barrier is not None:
         values |= {
-            "impact_force_x": forces[2 * at.FACE],
-            "impact_force_y": forces[2 * at.FACE + 1],
-            "top_force_x": forces[2 * at.TOP],
-            "top_force_y": forces[2 * at.TOP + 1],
-            "back_force_x": forces[2 * at.BACK],
-            "back_force_y": forces[2 * at.BACK + 1],
-            "barrier_velocity": clock[at.BARRIER_VELOCITY],
-            "barrier_displacement": clock[at.GRID_SHIFT],
-            "barrier_work": clock[at.BARRIER_WORK],
+            "barrier_velocity": barrier.velocity,
+            "barrier_displacement": barrier.displacement,
+            "barrier_work": barrier.work,
         }
-    if constants.barrier_mass is not None and constants.barrier_weight is not None:
-        friction = clock[at.BASE_FRICTION_IMPULSE] - last.clock[at.BASE_FRICTION_IMPULSE]
-        vertical = sum(forces[2 * surface + 1] for surface in (at.FACE, at.TOP, at.BACK))
-        values |= {
-            "base_force": -friction * rate,
-            "base_normal_force": max(constants.barrier_weight - vertical, 0.0),
-            "base_friction_work": clock[at.BASE_FRICTION_WORK],
-            "barrier_kinetic_energy": 0.5 * constants.barrier_mass * clock[at.BARRIER_VELOCITY] ** 2,
-        }
-    if effects.ground != "none":
-        values |= {"ground_force_x": forces[2 * at.GROUND], "ground_force_y": forces[2 * at.GROUND + 1]}
+        body = constants.bodies[constants.barrier]
+        if isinstance(body.motion, Sliding):
+            vertical = sum(values[f"{surface.name}_force_y"] for surface in body.surfaces)
+            weight = -body.motion.mass * constants.gravity[1]
+            values |= {
+                "base_force": -(now.base_impulse - last.base_impulse) * rate,
+                "base_normal_force": max(weight - vertical, 0.0),
+                "base_friction_work": barrier.base_work,
+                "barrier_kinetic_energy": 0.5 * body.motion.mass * barrier.velocity**2,
+            }
     values |= {
         "flow_kinetic_energy": sums[at.LEDGER_KINETIC],
         "flow_gravitational_energy": sums[at.LEDGER_GRAVITATIONAL],

@@ -1,0 +1,1 @@
+"""The rooms of the simulator: one idea each, whose next kind is one new file."""

@@ -1,0 +1,232 @@
+"""The arrays of the bodies and of their contact on the device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warp_mpm.effects import Effects
+from warp_mpm.grid import GridLayout
+
+from .body import Body, Driven, Sliding
+from .nodes import acting_outline, contact_nodes
+from .outline import ENDLESS
+
+
+@dataclass(frozen=True)
+class Group:
+    """Arrays that kernels take together."""
+
+    structure: Any
+    """The Warp structure that holds them."""
+    arrays: dict[str, Any]
+    """The same, by name."""
+
+
+def filled(
+    structure: Any, fields: Mapping[str, Any], given: Mapping[str, Any], shapes: Mapping[str, Any], device: Any
+) -> Group:
+    """The structure with a value for each of its fields, an array where it is one: what is given, else zeros of the
+    shape."""
+    arrays = {}
+    for name, field in fields.items():
+        if not isinstance(field, wp.array):
+            setattr(structure, name, given[name])
+            continue
+        if name in given:
+            array = wp.array(given[name], dtype=field.dtype, device=device)
+        else:
+            array = wp.zeros(shapes[name], dtype=field.dtype, device=device)
+        setattr(structure, name, array)
+        arrays[name] = array
+    return Group(structure, arrays)
+
+
+def carrier(bodies: Sequence[Body]) -> int:
+    """Number of the body with which the grid rides; -1 where it rests.
+
+    Raises:
+        ValueError: two bodies carry the grid.
+    """
+    found = [number for number, body in enumerate(bodies) if body.carries_grid]
+    if len(found) > 1:
+        names = " and ".join(bodies[number].name for number in found)
+        raise ValueError(f"{names} both carry the grid; carries_grid must be True of at most one body")
+    return found[0] if found else -1
+
+
+def passes(body: Body, bodies: Sequence[Body]) -> bool:
+    """Whether a body moves relative to the grid. One that is level and without end looks the same wherever that is."""
+    riding = carrier(bodies)
+    if riding >= 0 and body is bodies[riding]:
+        return False
+    pieces = body.outline.segments
+    level = not pieces.closed and len(pieces) == 1 and bool(pieces.normal[0, 0] == 0.0)
+    return body.moves or (riding >= 0 and bodies[riding].moves and not level)
+
+
+def effects_of(bodies: Sequence[Body]) -> dict[str, bool]:
+    """Those fields of `Effects` that the bodies decide."""
+    return {
+        "bodies": len(bodies) > 0,
+        "friction": any(body.rubs for body in bodies),
+        "sliding": any(isinstance(body.motion, Sliding) for body in bodies),
+        "driven": any(isinstance(body.motion, Driven) for body in bodies),
+        "passing": any(passes(body, bodies) for body in bodies),
+    }
+
+
+def body_arrays(
+    bodies: Sequence[Body],
+    effects: Effects,
+    types: SimpleNamespace,
+    grid: GridLayout,
+    gravity: tuple[float, float],
+    *,
+    device: Any,
+) -> Group:
+    """Outlines, surfaces and motion of all bodies; fields that nothing is said of begin at 0."""
+    count = len(bodies)
+    given: dict[str, Any] = {"count": count}
+    if effects.bodies:
+        pieces = [body.outline.segments for body in bodies]
+        given |= {
+            "first_piece": _firsts([len(piece) for piece in pieces]),
+            "first_surface": _firsts([len(body.surfaces) for body in bodies]),
+            "box": np.array([_box(body, bodies, grid) for body in bodies]),
+            "begin": np.concatenate([piece.begin for piece in pieces]),
+            "along": np.concatenate([piece.along for piece in pieces]),
+            "low": np.concatenate([piece.low for piece in pieces]),
+            "high": np.concatenate([piece.high for piece in pieces]),
+            "normal": np.concatenate([piece.normal for piece in pieces]),
+            "offset": np.concatenate([piece.offset for piece in pieces]),
+        }
+    if effects.friction:
+        given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
+        given["rubs"] = np.array([body.rubs for body in bodies], dtype=np.int32)
+    if effects.moving:
+        given["carrier"] = carrier(bodies)
+    if effects.sliding:
+        mass = np.array([body.motion.mass if isinstance(body.motion, Sliding) else 0.0 for body in bodies])
+        given |= {
+            "mass": mass,
+            "weight": -mass * gravity[1],
+            "pull": mass * gravity[0],
+            "base_friction": np.array(
+                [body.motion.base_friction if isinstance(body.motion, Sliding) else 0.0 for body in bodies]
+            ),
+        }
+    if effects.driven:
+        tables = [body.motion for body in bodies if isinstance(body.motion, Driven)]
+        given |= {
+            "first_time": _firsts([len(b.motion.times) if isinstance(b.motion, Driven) else 0 for b in bodies]),
+            "times": np.concatenate([table.times for table in tables]),
+            "velocities": np.concatenate([table.velocities for table in tables]),
+        }
+    return filled(types.Bodies(), types.body_fields, given, dict.fromkeys(types.body_fields, count), device)
+
+
+def contact_arrays(
+    bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
+) -> list[Group]:
+    """Where each body acts, and what is gathered there in a step."""
+    first = _firsts([len(body.surfaces) for body in bodies])
+    groups = []
+    for number, body in enumerate(bodies):
+        passing = passes(body, bodies)
+        found = _window(body, grid, types) if passing else _resting(body, grid)
+        surface = "surfaces" if passing else "surface"
+        found[surface] = found[surface] + first[number]
+        fields = {
+            name: field
+            for name, field in types.contact_fields.items()
+            if name in _ALWAYS
+            or (name in _SLIDING and isinstance(body.motion, Sliding))
+            or (passing and name not in _SLIDING)
+        }
+        given = {"body": number} | found
+        shapes = dict.fromkeys(types.contact_fields, found["places"])
+        groups.append(filled(types.Contact(), fields, given, shapes, device))
+    return groups
+
+
+_ALWAYS = ("body", "node", "mirror", "normal", "surface", "block", "start")
+_SLIDING = ("pair", "mass", "velocity", "liquid_free")
+
+
+def _resting(body: Body, grid: GridLayout) -> dict[str, Any]:
+    nodes = contact_nodes(body, grid)
+    return {
+        "places": len(nodes.node),
+        "node": nodes.node,
+        "mirror": nodes.mirror,
+        "normal": nodes.normal,
+        "surface": nodes.surface,
+        "block": nodes.block,
+        "start": nodes.start,
+    }
+
+
+def _window(body: Body, grid: GridLayout, types: SimpleNamespace) -> dict[str, Any]:
+    """For the kernel `place`: the nodes around a body that moves relative to the grid, wherever that lies along x."""
+    acting = acting_outline(body, grid, passing=True)
+    spacing = grid.spacing
+    low, high = (-math.inf, math.inf) if body.moves else (grid.bottom, grid.bottom + grid.rows * spacing)
+    box = acting.outline.box(-ENDLESS, ENDLESS, max(low, -ENDLESS), min(high, ENDLESS))
+    assert box is not None
+    reach = (acting.depth + 1.0) * spacing
+    columns = int(min((box[1] - box[0] + 2.0 * reach) / spacing + 2.0, grid.columns))
+    rows = int(min((box[3] - box[2] + 2.0 * reach) / spacing + 2.0, grid.rows))
+    return {
+        "places": columns * rows,
+        "block": np.full(columns, -1, dtype=np.int32),
+        "start": (np.arange(columns + 1) * rows).astype(np.int32),
+        "first_piece": np.array([0, len(acting.outline)], dtype=np.int32),
+        "begin": acting.outline.begin,
+        "along": acting.outline.along,
+        "low": acting.outline.low,
+        "high": acting.outline.high,
+        "normals": acting.outline.normal,
+        "offset": acting.outline.offset,
+        "crest": np.minimum(acting.crest, ENDLESS),
+        "surfaces": np.array(body.surface_of_piece, dtype=np.int32),
+        "corner": types.V2(max(box[0] - reach, -ENDLESS), max(box[2] - reach, -ENDLESS)),
+        "columns": columns,
+        "rows": rows,
+        "depth": acting.depth,
+        "edge": int(body.edge),
+    }
+
+
+def _box(body: Body, bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.float64]:
+    """Around the solid (x from, x to, y from, y to), with all that lies beyond the grid; nothing of an edge."""
+    if body.edge:
+        return np.array([ENDLESS, -ENDLESS, ENDLESS, -ENDLESS])
+    pieces = body.outline.segments
+    everywhere = np.array([-ENDLESS, ENDLESS, -ENDLESS, ENDLESS])
+    if pieces.closed:
+        (x0, y0), (x1, y1) = body.outline.vertices.min(axis=0), body.outline.vertices.max(axis=0)
+        return np.array([x0, x1, y0, y1])
+    if passes(body, bodies):
+        return everywhere
+    edges = (grid.left, grid.left + grid.columns * grid.spacing, grid.bottom, grid.bottom + grid.rows * grid.spacing)
+    found = pieces.box(*edges)
+    corners = np.array([[x, y] for x in edges[:2] for y in edges[2:]])
+    solid = corners[body.outline.distance(corners) < 0.0]
+    if found is None:
+        return everywhere if len(solid) else np.array([ENDLESS, -ENDLESS, ENDLESS, -ENDLESS])
+    for x, y in solid:
+        found[0 if x == edges[0] else 1] = -ENDLESS if x == edges[0] else ENDLESS
+        found[2 if y == edges[2] else 3] = -ENDLESS if y == edges[2] else ENDLESS
+    return found
+
+
+def _firsts(counts: Sequence[int]) -> NDArray[np.int32]:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
