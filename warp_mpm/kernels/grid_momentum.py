@@ -22,21 +22,30 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     LIQUID_ALONE = effects.liquid_alone
 
     @wp.func
+    def per_mass(mass: F, parameters: Parameters) -> V:
+        """One over the mass of the phase that each entry of a node's velocity belongs to."""
+        solid = F(1.0) / mass
+        result = V()
+        if TWO_PHASE:
+            liquid = solid / parameters.liquid_ratio
+            result = V(solid, solid, liquid, liquid)
+        else:
+            result = V(solid, solid)
+        return result
+
+    @wp.func
     def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:
         """Velocities at the end of the step under internal forces and gravity alone, from the momentum."""
-        inverse = F(1.0) / grid.mass[i, j]
-        result = grid.velocity[i, j] * inverse
+        inverse = per_mass(grid.mass[i, j], parameters)
+        result = wp.cw_mul(inverse, grid.velocity[i, j])
         if FLIP:
-            force = grid.force[i, j]
             g = parameters.gravity
-            solid = inverse / parameters.solid_density
+            gravity = V()
             if TWO_PHASE:
-                liquid = inverse / parameters.liquid_density
-                result += time_step * V(
-                    force[0] * solid + g[0], force[1] * solid + g[1], force[2] * liquid + g[0], force[3] * liquid + g[1]
-                )
+                gravity = V(g[0], g[1], g[0], g[1])
             else:
-                result += time_step * V(force[0] * solid + g[0], force[1] * solid + g[1])
+                gravity = V(g[0], g[1])
+            result += time_step * (wp.cw_mul(inverse, grid.force[i, j]) + gravity)
         return result
 
     @wp.func
@@ -45,9 +54,8 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
         Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
         `coefficient` is Q over its value at the initial porosity."""
-        total = parameters.solid_density + parameters.liquid_density
-        solid_share = parameters.solid_density / total
-        liquid_share = parameters.liquid_density / total
+        solid_share = F(1.0) / (F(1.0) + parameters.liquid_ratio)
+        liquid_share = parameters.liquid_ratio * solid_share
         lost = coefficient * parameters.drag_rate * time_step
         if IMPLICIT_DRAG:
             lost = lost / (F(1.0) + lost)
@@ -69,7 +77,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
-                    old = grid.velocity[i, j] / mass
+                    old = wp.cw_mul(per_mass(mass, parameters), grid.velocity[i, j])
                     new = free_velocity(grid, parameters, i, j, time_step)
                     if LIQUID_ALONE:
                         if TWO_PHASE:

@@ -159,7 +159,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["liquid_divergence"] = array(dtype=scalar)
 
     grid: dict[str, Any] = {
-        "mass": array(dtype=scalar, ndim=2),
+        "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
@@ -169,7 +169,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["force"] = array(dtype=V, ndim=2)
         grid["increment"] = array(dtype=V, ndim=2)
     if effects.porosity_update:
-        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient times volume
+        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it.
@@ -228,6 +228,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         for name in (
             "porosity",
             "true_liquid_density",
+            "filling_ratio",  # mass of liquid that would fill the whole volume, over that of the solid
             "liquid_bulk_modulus",
             "cavitation_pressure",
             "relaxation_rate",
@@ -238,7 +239,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.two_phase:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
-        parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
+        parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
+        parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     if effects.ground != "none":
         parameters["ground_row"] = wp.int32  # first row of nodes above the ground
         parameters["ground_friction"] = scalar

@@ -95,7 +95,7 @@ def make_transfer(
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """Mass, momentum and internal force of the points to the nodes, per unit of each phase's density.
+        """Mass, momentum and internal force of the points to the nodes, the latter two of each phase.
 
         Internal forces per node: solid -sum V (sigma' - (1 - n) p I) grad w, liquid +sum V n p grad w, with p
         compression positive: audit 3.4, action and reaction between the phases included.
@@ -115,7 +115,14 @@ def make_transfer(
         # Grains do not give way: once the voids are closed the same pressure acts on their volume, not on less.
         volume = larger(read(points.volume, p), parameters.grain_share * reference)
         stress = read(points.stress, p)
-        velocity = read(points.velocity, p) * reference
+        mass = reference * parameters.solid_density
+        masses = V()
+        if TWO_PHASE:
+            liquid_mass = reference * parameters.liquid_density
+            masses = V(mass, mass, liquid_mass, liquid_mass)
+        else:
+            masses = V(mass, mass)
+        velocity = wp.cw_mul(masses, read(points.velocity, p))
         time_step = F(clock[wp.static(TIME_STEP)])
         gravity = V()
         if TWO_PHASE:
@@ -147,10 +154,10 @@ def make_transfer(
         liquid_force *= parameters.inverse_spacing
         if APIC:
             # The nodes receive the momentum at the end of the step: the force's share of it rides along.
-            push *= time_step / parameters.solid_density
-            velocity += reference * time_step * gravity
+            push *= time_step
+            velocity += time_step * wp.cw_mul(masses, gravity)
             if TWO_PHASE:
-                liquid_force *= time_step / parameters.liquid_density
+                liquid_force *= time_step
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push
@@ -167,8 +174,8 @@ def make_transfer(
         change_x = V()
         change_y = V()
         if APIC:
-            change_x = read(points.affine_x, p) * (parameters.spacing * reference)
-            change_y = read(points.affine_y, p) * (parameters.spacing * reference)
+            change_x = parameters.spacing * wp.cw_mul(masses, read(points.affine_x, p))
+            change_y = parameters.spacing * wp.cw_mul(masses, read(points.affine_y, p))
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
@@ -181,7 +188,7 @@ def make_transfer(
                 column += column_force
             column_slope = wx[k] * force_y
             column_change = wx[k] * change_y
-            column_mass = wx[k] * reference
+            column_mass = wx[k] * mass
             for m in range(3):
                 node = first + k * parameters.rows + m
                 add(grid.mass, node, wy[m] * column_mass)
@@ -213,10 +220,11 @@ def make_transfer(
                 ):
                     rubbed = wp.bool(True)
             if rubbed:
-                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.true_liquid_density
+                # Of liquid that fills the whole volume, times the mixture's mass over its own.
+                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio
                 share = F(1.0)
                 if FLIP:
-                    share = time_step / parameters.solid_density
+                    share = time_step
                 along_x = V2(alone, F(0.0)) - share * force_x
                 along_y = V2(F(0.0), alone) - share * force_y
                 for k in range(3):

@@ -64,7 +64,7 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
     shear = young / (2.0 * (1.0 + nu))
     lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     values: dict[str, Any] = {
-        "solid_density": material.density if effects.formulation == "undrained" else material.solid_partial_density,
+        "solid_density": _moving_density(scenario, effects),
         "lame": lame,
         "shear_modulus": shear,
         "bulk_modulus": lame + 2.0 / 3.0 * shear,
@@ -86,12 +86,19 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
     return values
 
 
+def _moving_density(scenario: Scenario, effects: Effects) -> float:
+    """Mass per volume of the whole that moves with the solid [kg/m3]."""
+    material = scenario.flow.material
+    return material.density if effects.formulation == "undrained" else material.solid_partial_density
+
+
 def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
     material: Any = scenario.flow.material
     numerics = scenario.numerics
     values = {
         "porosity": material.porosity,
         "true_liquid_density": material.liquid_density_kg_per_m3,
+        "filling_ratio": material.liquid_density_kg_per_m3 / _moving_density(scenario, effects),
         "liquid_bulk_modulus": material.liquid_bulk_modulus_Pa,
         "cavitation_pressure": material.cavitation_pressure_Pa,
         "relaxation_rate": numerics.pressure_relaxation * (limits.sound_speed / numerics.spacing_m),
@@ -101,7 +108,8 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
         coefficient = n**2 * material.liquid_density_kg_per_m3 * STANDARD_GRAVITY / material.hydraulic_conductivity
         values |= {
             "liquid_density": liquid,
-            "drag_coefficient": coefficient,
+            "liquid_ratio": liquid / solid,
+            "drag_per_mass": coefficient / solid,
             "drag_rate": coefficient * (1.0 / solid + 1.0 / liquid),
         }
     return values
