@@ -23,6 +23,7 @@ from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
+from .simulator.step import launches
 from .state import saved
 from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
 from .state.divergence import NAMES, SimulationDiverged, what_diverged
@@ -94,6 +95,21 @@ class Simulation:
         self.material_points = len(initial.volume)
         self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
         self._make_arrays(initial)
+        self._arguments = self._clock_arrays | {
+            "points": self._points,
+            "grid": self._grid,
+            "contact": self._contact,
+            "contact_count": self._contact_count,
+            "parameters": self._parameters,
+        }
+        self._counts = {
+            "one": 1,
+            "workers": self._workers,
+            "points": self.material_points,
+            "rows": self.grid.rows,
+            "columns": self.grid.columns,
+            "contacts": self._contact_count,
+        }
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -113,6 +129,7 @@ class Simulation:
         self._points, self._point_arrays = points.structure, points.arrays
         grid = grid_arrays(scenario, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
+        self._contact: Any = None
         self._contact_count, self._contact_arrays = 0, {}
         if scenario.barrier is not None:
             contact = contact_arrays(scenario.barrier, types, self.grid, device=device)
@@ -142,47 +159,8 @@ class Simulation:
             self._on_launch(name)
 
     def _step(self) -> None:
-        effects, grid, points, parameters, clock = (
-            self.effects,
-            self._grid,
-            self._points,
-            self._parameters,
-            self._clock,
-        )
-        count = self.material_points
-        self._launch("clear", self._workers, grid, parameters)
-        self._launch("forget", 1, grid)
-        self._launch("scatter", count, points, grid, parameters, clock)
-        self._launch("move", self._workers, grid, parameters, clock)
-        if effects.ground != "none":
-            self._launch("ground", self._workers, grid, parameters, clock, self._reactions)
-        if effects.side_walls:
-            self._launch("side_walls", self.grid.rows, grid, parameters, clock, self._reactions)
-        if effects.ceiling:
-            self._launch("ceiling", self.grid.columns, grid, parameters, clock, self._reactions)
-        if effects.barrier != "none":
-            self._launch("collect", self._contact_count, self._contact, grid, parameters, clock)
-            if effects.barrier == "sliding":
-                self._launch("slide", 1, self._contact, self._contact_count, parameters, clock, self._counters)
-            self._launch("barrier", self._contact_count, self._contact, grid, parameters, clock, self._reactions)
-        self._launch("gather", count, points, grid, parameters, clock)
-        if effects.smoothing_grid:
-            self._launch("average", self._workers, grid, parameters)
-        self._launch("advect", count, points, grid, parameters, clock, self._counters, self._left)
-        self._launch("update", count, points, parameters, clock)
-        self._launch("bound", count, points, parameters, clock)
-        self._launch(
-            "tick",
-            1,
-            parameters,
-            clock,
-            self._counters,
-            self._running,
-            self._reactions,
-            self._left,
-            self._times,
-            self._velocities,
-        )
+        for launch in launches(self.effects):
+            self._launch(launch.kernel, self._counts[launch.over], *(self._arguments[name] for name in launch.takes))
 
     def _start(self) -> None:
         self._launch(

@@ -8,9 +8,11 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..effects import Effects
+from ..simulator.schemes.scheme import all_functions
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
+from .elementary import make_elementary
 from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
@@ -34,6 +36,8 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     types = layout(effects)
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
+    tools = SimpleNamespace(**make_elementary(types).__dict__, **shapes.__dict__)
+    types.scheme = SimpleNamespace(**all_functions(effects.scheme, types, tools))
     transfer = make_transfer(types, shapes, pore, module)
     constitutive = make_constitutive(types, shapes, pore, module)
     clock = make_clock(types, module)
@@ -45,6 +49,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         start=clock.start,
         tick=clock.tick,
         ledger=make_ledger(types, pore, module).ledger,
+        **effects.scheme.kernels(types, tools, module),
     )
     if effects.ground != "none" or effects.side_walls or effects.ceiling or effects.barrier != "none":
         contact = make_contact(types, module)

@@ -108,7 +108,7 @@ def make_constitutive(
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
+    displacement = types.scheme.displacement
     PLASTICITY = effects.plasticity
     GROUND = effects.ground != "none"
     BARRIER = effects.barrier != "none"
@@ -198,11 +198,7 @@ def make_constitutive(
             write(points.smooth, p, smooth)
 
         before = x
-        if FLIP:
-            x += time_step * read(points.advection, p)
-        else:
-            v = read(points.velocity, p)
-            x += time_step * V2(v[0], v[1])
+        x += displacement(points, p, grid, x, shift, time_step, parameters)
         # Barrier and grid as they will lie in the next step: whatever their speed, no point then reaches beyond them.
         if MOVING:
             middle = F(0.5) * (F(clock[wp.static(BARRIER_VELOCITY)]) + F(clock[wp.static(OLD_BARRIER_VELOCITY)]))

@@ -37,7 +37,7 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Contact = types.Contact
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
+    receive = types.scheme.receive
     FRICTION = effects.friction
     BARRIER_CARRIED = effects.barrier_friction and LIQUID
     GROUND_CARRIED = effects.ground == "frictional" and LIQUID
@@ -134,8 +134,7 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     @wp.func
     def add(grid: Grid, i: wp.int32, j: wp.int32, change: V):
         grid.velocity[i, j] += change
-        if FLIP:
-            grid.increment[i, j] += change
+        receive(grid, i, j, change)
 
     @wp.func
     def record(reactions: wp.array(dtype=wp.float64), surface: wp.int32, force: V2):

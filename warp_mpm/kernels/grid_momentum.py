@@ -18,7 +18,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     POROSITY = effects.porosity_update
-    FLIP = effects.transfer == "flip"
+    free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
 
     @wp.func
@@ -31,21 +31,6 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
             result = V(solid, solid, liquid, liquid)
         else:
             result = V(solid, solid)
-        return result
-
-    @wp.func
-    def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:
-        """Velocities at the end of the step under internal forces and gravity alone, from the momentum."""
-        inverse = per_mass(grid.mass[i, j], parameters)
-        result = wp.cw_mul(inverse, grid.velocity[i, j])
-        if FLIP:
-            g = parameters.gravity
-            gravity = V()
-            if TWO_PHASE:
-                gravity = V(g[0], g[1], g[0], g[1])
-            else:
-                gravity = V(g[0], g[1])
-            result += time_step * (wp.cw_mul(inverse, grid.force[i, j]) + gravity)
         return result
 
     @wp.func
@@ -65,9 +50,15 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def move(grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """From the momentum of every node in use to its velocity (with FLIP: and the increment of that)."""
+        """From the momentum of every node in use to its velocity."""
         worker = wp.tid()
         time_step = F(clock[wp.static(TIME_STEP)])
+        g = parameters.gravity
+        gravity = V()
+        if TWO_PHASE:
+            gravity = V(g[0], g[1], g[0], g[1])
+        else:
+            gravity = V(g[0], g[1])
         for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
             block = grid.active[s / wp.static(BLOCK)]
             bi = block / parameters.block_rows
@@ -77,8 +68,9 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
-                    old = wp.cw_mul(per_mass(mass, parameters), grid.velocity[i, j])
-                    new = free_velocity(grid, parameters, i, j, time_step)
+                    inverse = per_mass(mass, parameters)
+                    old = wp.cw_mul(inverse, grid.velocity[i, j])
+                    new = free_velocity(grid, i, j, inverse, gravity, time_step)
                     if LIQUID_ALONE:
                         if TWO_PHASE:
                             grid.liquid_alone[i, j] = V2(new[2], new[3])
@@ -90,7 +82,6 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             coefficient = grid.drag[i, j] / mass
                         new = dragged(new, coefficient, parameters, time_step)
                     grid.velocity[i, j] = new
-                    if FLIP:
-                        grid.increment[i, j] = new - old
+                    keep(grid, i, j, old, new)
 
     return SimpleNamespace(move=move)

@@ -126,6 +126,9 @@ def layout(effects: Effects) -> SimpleNamespace:
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     array = wp.array
+    types = SimpleNamespace(
+        effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, components=components
+    )
 
     points: dict[str, Any] = {
         "position": array(dtype=V2),
@@ -137,11 +140,6 @@ def layout(effects: Effects) -> SimpleNamespace:
         "gradient": array(dtype=V4),
         "inside": array(dtype=wp.int32),
     }
-    if effects.transfer == "flip":
-        points["advection"] = array(dtype=V2)
-    else:
-        points["affine_x"] = array(dtype=V)
-        points["affine_y"] = array(dtype=V)
     if effects.plasticity:
         points["solid_gap"] = array(dtype=scalar)
     if effects.liquid:
@@ -158,6 +156,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.two_phase and not effects.volumetric_smoothing:
         points["liquid_divergence"] = array(dtype=scalar)
 
+    points |= {name: array(dtype=kind) for name, kind in effects.scheme.point_fields(types).items()}
+
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
@@ -165,9 +165,6 @@ def layout(effects: Effects) -> SimpleNamespace:
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
     }
-    if effects.transfer == "flip":
-        grid["force"] = array(dtype=V, ndim=2)
-        grid["increment"] = array(dtype=V, ndim=2)
     if effects.porosity_update:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
     if effects.liquid_alone:
@@ -181,6 +178,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.density_correction:
         # The same with half a cell more in front of an inclined face, where points come to rest.
         grid["corner_space"] = array(dtype=scalar, ndim=2)
+
+    grid |= {name: array(dtype=kind, ndim=2) for name, kind in effects.scheme.grid_fields(types).items()}
 
     parameters: dict[str, Any] = {
         "spacing": scalar,
@@ -200,8 +199,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "wave_speed": wp.float64,
         "courant_number": wp.float64,
         "largest_stable_step": wp.float64,
-        "pic_rate": scalar,
     }
+    parameters |= dict.fromkeys(effects.scheme.constants, scalar)
     if effects.density_correction:
         parameters["density_correction"] = scalar  # share of the crowding undone per unit of shear strain
     if effects.bulk_viscosity:
@@ -274,20 +273,9 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.barrier_friction and effects.liquid:
         contact["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
 
-    return SimpleNamespace(
-        effects=effects,
-        scalar=scalar,
-        V2=V2,
-        V3=V3,
-        V4=V4,
-        V=V,
-        S=S,
-        components=components,
-        Points=_structure("Points", points),
-        Grid=_structure("Grid", grid),
-        Parameters=_structure("Parameters", parameters),
-        Contact=_structure("Contact", contact),
-        point_fields=points,
-        grid_fields=grid,
-        contact_fields=contact,
-    )
+    types.Points = _structure("Points", points)
+    types.Grid = _structure("Grid", grid)
+    types.Parameters = _structure("Parameters", parameters)
+    types.Contact = _structure("Contact", contact)
+    types.point_fields, types.grid_fields, types.contact_fields = points, grid, contact
+    return types

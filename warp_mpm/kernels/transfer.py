@@ -40,8 +40,15 @@ def make_transfer(
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
-    APIC = effects.transfer == "apic"
+    scheme = types.scheme
+    empty, start, column, deposit, collect = (
+        scheme.clear,
+        scheme.start,
+        scheme.column,
+        scheme.deposit,
+        scheme.collect,
+    )
+    force_share, impulse_share = scheme.force_share, scheme.impulse_share
     CORNERS = effects.smoothing_grid
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
@@ -69,8 +76,7 @@ def make_transfer(
                 j = bj * wp.static(BLOCK) + b
                 grid.mass[i, j] = F(0.0)
                 grid.velocity[i, j] = V()
-                if FLIP:
-                    grid.force[i, j] = V()
+                empty(grid, i, j)
                 if LIQUID_ALONE:
                     grid.liquid_alone[i, j] = V2()
                 if POROSITY:
@@ -122,7 +128,6 @@ def make_transfer(
             masses = V(mass, mass, liquid_mass, liquid_mass)
         else:
             masses = V(mass, mass)
-        velocity = wp.cw_mul(masses, read(points.velocity, p))
         time_step = F(clock[wp.static(TIME_STEP)])
         gravity = V()
         if TWO_PHASE:
@@ -150,14 +155,9 @@ def make_transfer(
             n = porosity(reference, volume, parameters)
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
-        push = volume * parameters.inverse_spacing
-        liquid_force *= parameters.inverse_spacing
-        if APIC:
-            # The nodes receive the momentum at the end of the step: the force's share of it rides along.
-            push *= time_step
-            velocity += time_step * wp.cw_mul(masses, gravity)
-            if TWO_PHASE:
-                liquid_force *= time_step
+        per_cell = parameters.inverse_spacing * force_share(time_step)
+        push = volume * per_cell
+        liquid_force *= per_cell
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push
@@ -170,22 +170,15 @@ def make_transfer(
         else:
             force_x = V(xx, xy)
             force_y = V(xy, yy)
-        # Change of the point's affine velocity field from one node to the next.
-        change_x = V()
-        change_y = V()
-        if APIC:
-            change_x = parameters.spacing * wp.cw_mul(masses, read(points.affine_x, p))
-            change_y = parameters.spacing * wp.cw_mul(masses, read(points.affine_y, p))
+        momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
 
         # What depends on x alone is formed once per column of nodes.
         for k in range(3):
-            column = wx[k] * velocity + (wx[k] * to_x[k]) * change_x
+            column_momentum = column(wx[k], dx[k], to_x[k], momentum, force_x, change_x)
             column_force = dx[k] * force_x
-            if APIC:
-                column += column_force
             column_slope = wx[k] * force_y
             column_change = wx[k] * change_y
             column_mass = wx[k] * mass
@@ -196,12 +189,9 @@ def make_transfer(
                     # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
                     ratio = n / parameters.porosity
                     add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
-                if APIC:
-                    value = column + to_y[m] * column_change
-                    add(grid.velocity, node, wy[m] * value + dy[m] * column_slope)
-                else:
-                    add(grid.velocity, node, wy[m] * column)
-                    add(grid.force, node, wy[m] * column_force + dy[m] * column_slope)
+                deposit(
+                    grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope
+                )
 
         if LIQUID_ALONE:
             rubbed = wp.bool(False)
@@ -222,9 +212,7 @@ def make_transfer(
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
                 alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio
-                share = F(1.0)
-                if FLIP:
-                    share = time_step
+                share = impulse_share(time_step)
                 along_x = V2(alone, F(0.0)) - share * force_x
                 along_y = V2(F(0.0), alone) - share * force_y
                 for k in range(3):
@@ -283,38 +271,11 @@ def make_transfer(
         along_x = slope_x * parameters.inverse_spacing
         along_y = mean(wx, left_slope, centre_slope, right_slope) * parameters.inverse_spacing
 
-        if FLIP:
-            increment = V()
-            for k in range(3):
-                for m in range(3):
-                    increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
-            pic = wp.min(parameters.pic_rate * time_step, F(1.0))
-            old = read(points.velocity, p)
-            new = old + increment + pic * (smooth - old - increment)
-            if TWO_PHASE:
-                # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
-                decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
-                unseen = V2(
-                    old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
-                    old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
-                )
-                new = V(
-                    new[0],
-                    new[1],
-                    new[0] + smooth[2] - smooth[0] + decay * unseen[0],
-                    new[1] + smooth[3] - smooth[1] + decay * unseen[1],
-                )
-            write(points.velocity, p, new)
-            write(points.advection, p, V2(smooth[0], smooth[1]))
-            fastest = speed_squared(new)
-        else:
-            write(points.velocity, p, smooth)
-            # Moments about the point, not about the middle node.
-            lean_x += (F(0.5) - fx) * smooth
-            lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
-            write(points.affine_x, p, lean_x * (F(4.0) * parameters.inverse_spacing))
-            write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
-            fastest = speed_squared(smooth)
+        # Moments about the point, not about the middle node.
+        lean_x += (F(0.5) - fx) * smooth
+        lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
+        velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
+        fastest = speed_squared(velocity)
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
         if fastest > clock[wp.static(SPEED_MAX)]:
             wp.atomic_max(clock, wp.static(SPEED_MAX), fastest)

@@ -27,7 +27,7 @@ def kernel_parameters(
         limits: on the time step.
         workers: threads that share the blocks of the grid in use.
     """
-    values = _grid_and_clock(scenario, grid, limits, workers) | _skeleton(scenario, effects, limits)
+    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(scenario, effects, limits)
     if effects.liquid:
         values |= _liquid(scenario, effects, limits)
     values |= _edges(scenario, effects, grid)
@@ -39,7 +39,9 @@ def kernel_parameters(
     return parameters
 
 
-def _grid_and_clock(scenario: Scenario, grid: GridLayout, limits: StepLimits, workers: int) -> dict[str, Any]:
+def _grid_and_clock(
+    scenario: Scenario, effects: Effects, grid: GridLayout, limits: StepLimits, workers: int
+) -> dict[str, Any]:
     numerics = scenario.numerics
     return {
         "spacing": numerics.spacing_m,
@@ -54,8 +56,7 @@ def _grid_and_clock(scenario: Scenario, grid: GridLayout, limits: StepLimits, wo
         "wave_speed": limits.wave_speed,
         "courant_number": numerics.courant_number,
         "largest_stable_step": limits.drag_step,
-        "pic_rate": numerics.pic_share * (limits.sound_speed / numerics.spacing_m),
-    }
+    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed)
 
 
 def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
