@@ -8,6 +8,7 @@ from typing import Any
 
 from .effects import Effects
 from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .simulator.schemes import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,9 @@ def _numerical_rules(scenario: Scenario) -> list[Rule]:
         ),
         Rule(
             "transfer",
-            numerics.transfer,
+            SCHEMES.key(numerics.transfer),
             f"numerics.transfer = {numerics.transfer}",
-            {"numerics.transfer": "flip" if numerics.transfer == "apic" else "apic"},
+            {"numerics.transfer": next(name for name in SCHEMES.names if name != numerics.transfer)},
         ),
     ]
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from .simulator.schemes import SCHEMES, Scheme
+
 
 @dataclass(frozen=True)
 class Effects:
@@ -28,8 +30,8 @@ class Effects:
     """Excess pore pressure drawn toward its grid projection at a given rate."""
     bulk_viscosity: bool = False
     """Artificial viscosity on compression, against ringing behind a front of sound."""
-    transfer: Literal["flip", "apic"] = "flip"
-    """Velocity update: Sulsky's (FLIP, with a PIC share given as a rate) or affine (APIC)."""
+    transfer: str = "flip"
+    """Key of the scheme that brings velocities from the points to the nodes and back."""
     drag: Literal["none", "semi_implicit", "explicit"] = "none"
     """Interaction of the phases; only with two of them."""
     porosity_update: bool = False
@@ -49,6 +51,11 @@ class Effects:
     def liquid(self) -> bool:
         """Pore pressure exists."""
         return self.formulation != "dry"
+
+    @property
+    def scheme(self) -> Scheme:
+        """The transfer scheme."""
+        return SCHEMES.keyed(self.transfer)
 
     @property
     def two_phase(self) -> bool:

@@ -24,8 +24,9 @@ from .kernels.build import build_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
-from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of, passes
+from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
+from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, point_arrays
 from .state.divergence import NAMES, SimulationDiverged, what_diverged
@@ -132,6 +133,13 @@ class Simulation:
         self.material_points = len(initial.volume)
         self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
         self._make_arrays(initial)
+        self._arguments: dict[str, Any] = self._clock_arrays | {
+            "points": self._points,
+            "grid": self._grid,
+            "bodies": self._bodies,
+            "parameters": self._parameters,
+        }
+        self._counts = {"one": 1, "workers": self._workers, "points": self.material_points}
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -171,63 +179,27 @@ class Simulation:
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
-    def _launch(self, name: str, dim: Any, *arguments: Any, of: str = "") -> None:
-        """Args: name: of the kernel; of: the body that it acts for."""
-        kernel, kept = getattr(self._kernels, name), self._commands is not None
+    def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
+        kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
-        told = f"{name} {of}" if of else name
+        told = f"{launch.kernel} {launch.of}" if launch.of else launch.kernel
         if self._commands is not None:
             self._commands.append((told, command))
         if self._on_launch is not None:
             self._on_launch(told)
 
     def _step(self) -> None:
-        grid, points, parameters, bodies, clock = self._grid, self._points, self._parameters, self._bodies, self._clock
-        count = self.material_points
-        self._launch("clear", self._workers, grid, parameters)
-        self._launch("forget", 1, grid)
-        self._launch("scatter", count, points, grid, parameters, bodies, clock)
-        self._launch("move", self._workers, grid, parameters, clock)
-        for body, contact in zip(self.bodies, self._contacts, strict=True):
-            self._meet(body, contact)
-        self._launch("gather", count, points, grid, parameters, clock)
-        if self.effects.smoothing_grid:
-            self._launch("average", self._workers, grid, parameters)
-        self._launch(
-            "advect", count, points, grid, parameters, bodies, clock, self._counters, self._limiters, self._left
-        )
-        self._launch("update", count, points, parameters, clock)
-        self._launch("bound", count, points, parameters, clock, self._limiters)
-        self._launch(
-            "tick",
-            1,
-            parameters,
-            clock,
-            self._counters,
-            self._running,
-            self._reactions,
-            self._left,
-            self._balance,
-            bodies,
-            grid,
-        )
-
-    def _meet(self, body: Body, contact: Any) -> None:
-        """Contact of the flow with one body."""
-        structure, places = contact.structure, len(contact.arrays["node"])
-        grid, parameters, bodies, clock = self._grid, self._parameters, self._bodies, self._clock
-        if passes(body, self.bodies):
-            self._launch("place", places, structure, bodies, grid, parameters, of=body.name)
-        if isinstance(body.motion, Sliding):
-            self._launch("collect", places, structure, bodies, grid, parameters, of=body.name)
-            self._launch("slide", 1, structure, bodies, parameters, clock, self._counters, of=body.name)
-            self._launch("push", places, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
-        else:
-            groups = len(contact.arrays["block"])
-            self._launch("press", groups, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
+        contacts = {body.name: contact for body, contact in zip(self.bodies, self._contacts, strict=True)}
+        for launch in launches(self.effects, self.bodies):
+            counts, arguments = self._counts, self._arguments
+            if launch.of:
+                contact = contacts[launch.of]
+                counts = counts | {"places": len(contact.arrays["node"]), "groups": len(contact.arrays["block"])}
+                arguments = arguments | {"contact": contact.structure}
+            self._launch(launch, counts[launch.over], [arguments[name] for name in launch.takes])
 
     def _start(self) -> None:
-        self._launch("start", 1, self._parameters, self._clock, self._counters, self._running, self._bodies)
+        self._launch(START, 1, [self._arguments[name] for name in START.takes])
 
     def _interval(self) -> None:
         self._start()
@@ -235,7 +207,7 @@ class Simulation:
 
     def _sum_up(self) -> None:
         self._sums.zero_()
-        self._launch("ledger", self._workers, self._points, self._parameters, self._bodies, self._sums)
+        self._launch(LEDGER, self._workers, [self._arguments[name] for name in LEDGER.takes])
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .scenario import STANDARD_GRAVITY, Scenario, TwoPhaseFlow, UndrainedFlow, UndrainedMaterial
+from .simulator.schemes import SCHEMES, Scheme
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def explicit_drag_step(
     return (-2.0 * a + math.sqrt(4.0 * a * a + 8.0 * both)) / both
 
 
-def lone_point_courant_number(poisson_ratio: float, transfer: str, slopes: float = 6.0) -> float:
+def lone_point_courant_number(poisson_ratio: float, scheme: Scheme, slopes: float = 6.0) -> float:
     """Largest stable c dt / d of an elastic point that is alone on its nodes, below that of a full grid, 1.
 
     Its pressure acts on nodes that hold no more than its own mass, sum_i (w_i')^2 / w_i = S per direction: 4 in the
@@ -98,25 +99,25 @@ def lone_point_courant_number(poisson_ratio: float, transfer: str, slopes: float
 
     Args:
         poisson_ratio: 0.5 for a liquid.
-        transfer: "apic" or "flip".
+        scheme: apic, which keeps the point's affine field, or flip, which does not, or another of either kind.
         slopes: S; the worst place by default.
     """
-    kept = 2.0 if transfer == "apic" else 0.0
+    kept = 2.0 if scheme.keeps_affine_field else 0.0
     return math.sqrt(2.0 * (1.0 - poisson_ratio) / (slopes - kept))
 
 
 def _lone_point_speed(scenario: Scenario, sound: float) -> float:
     """Speed [m/s] that stands in for a lone point's limit; 0 where it cannot swing, because it bears no tension."""
-    material, transfer = scenario.flow.material, scenario.numerics.transfer
+    material, scheme = scenario.flow.material, SCHEMES.named(scenario.numerics.transfer)
     speed = 0.0
     if not material.plasticity or (material.tension_cutoff_Pa > 0.0 and material.cohesion_Pa > 0.0):
         density = material.solid_partial_density
         if isinstance(scenario.flow, UndrainedFlow):
             density = material.density
         skeleton = math.sqrt(material.oedometric_modulus / density)
-        speed = skeleton / lone_point_courant_number(material.poisson_ratio, transfer)
+        speed = skeleton / lone_point_courant_number(material.poisson_ratio, scheme)
     if isinstance(material, UndrainedMaterial) and material.cavitation_pressure_Pa > 0.0:
-        speed = max(speed, sound / lone_point_courant_number(0.5, transfer))
+        speed = max(speed, sound / lone_point_courant_number(0.5, scheme))
     return speed
 
 

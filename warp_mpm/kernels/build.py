@@ -9,9 +9,11 @@ import warp as wp
 
 from ..effects import Effects
 from ..simulator.bodies.kernels import make_body_functions, make_place
+from ..simulator.schemes.scheme import all_functions
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
+from .elementary import make_elementary
 from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
@@ -35,6 +37,8 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     types = layout(effects)
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
+    tools = SimpleNamespace(**make_elementary(types).__dict__, **shapes.__dict__)
+    types.scheme = SimpleNamespace(**all_functions(effects.scheme, types, tools))
     bodies = make_body_functions(types) if effects.bodies else None
     transfer = make_transfer(types, shapes, pore, bodies, module)
     constitutive = make_constitutive(types, shapes, pore, bodies, module)
@@ -47,6 +51,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         start=clock.start,
         tick=clock.tick,
         ledger=make_ledger(types, pore, module).ledger,
+        **effects.scheme.kernels(types, tools, module),
     )
     if effects.bodies:
         contact = make_contact(types, bodies, module)

@@ -106,7 +106,7 @@ def make_constitutive(
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
+    displacement = types.scheme.displacement
     PLASTICITY = effects.plasticity
     BODIES = effects.bodies
     Bodies = types.Bodies
@@ -200,11 +200,7 @@ def make_constitutive(
             write(points.smooth, p, smooth)
 
         before = x
-        if FLIP:
-            x += time_step * read(points.advection, p)
-        else:
-            v = read(points.velocity, p)
-            x += time_step * V2(v[0], v[1])
+        x += displacement(points, p, grid, x, shift, time_step, parameters)
         if BODIES:
             # Bodies and grid as they will lie in the next step: whatever their speed, no point reaches beyond them.
             if MOVING:

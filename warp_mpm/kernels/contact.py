@@ -29,7 +29,7 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
     surface_velocity_of = bodies_of.surface_velocity
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
+    receive = types.scheme.receive
     FRICTION = effects.friction
     CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
@@ -45,17 +45,17 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         parameters: Parameters,
         time_step: F,
     ) -> V:
-        """Change of the phases' velocities at the surface. `mass` is a volume: each phase's mass is its density times
-        that; `liquid_free` serves only to find the effective normal force."""
+        """Change of the phases' velocities at the surface. `mass` is the solid's, or the mixture's where
+        both phases move as one; `liquid_free` serves only to find the effective normal force."""
         target = wp.dot(surface_velocity, normal)
         solid = V2(velocity[0], velocity[1])
         solid_normal = wp.dot(solid, normal)
         change = F(0.0)
         liquid_change = F(0.0)
-        approach = parameters.solid_density * (target - solid_normal)
+        approach = target - solid_normal
         if TWO_PHASE:
             liquid_normal = velocity[2] * normal[0] + velocity[3] * normal[1]
-            approach += parameters.liquid_density * (target - liquid_normal)
+            approach += parameters.liquid_ratio * (target - liquid_normal)
             change = target - solid_normal
             liquid_change = target - liquid_normal
             if approach <= F(0.0):
@@ -71,22 +71,22 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         if FRICTION:
             if friction > F(0.0):
                 # Per unit of `mass`, like all below.
-                normal_force = parameters.solid_density * change
+                normal_force = change
                 if TWO_PHASE:
-                    normal_force += parameters.liquid_density * liquid_change
+                    normal_force += parameters.liquid_ratio * liquid_change
                 if LIQUID:
                     # What the liquid's pressure carries, where the surface holds the mixture at all.
-                    carried = parameters.true_liquid_density * (target - wp.dot(liquid_free, normal))
+                    carried = parameters.filling_ratio * (target - wp.dot(liquid_free, normal))
                     normal_force = wp.where(approach > F(0.0), normal_force - carried, F(0.0))
                 tangent = V2(-normal[1], normal[0])
                 slip = wp.dot(surface_velocity - solid, tangent)
-                inertia = parameters.solid_density
+                inertia = F(1.0)
                 share = F(0.0)
                 if TWO_PHASE:
                     if IMPLICIT_DRAG:
-                        drag = parameters.drag_coefficient * time_step
-                        share = drag / (parameters.liquid_density + drag)
-                        inertia += parameters.liquid_density * share
+                        drag = parameters.drag_per_mass * time_step
+                        share = drag / (parameters.liquid_ratio + drag)
+                        inertia += parameters.liquid_ratio * share
                 limit = friction * wp.max(normal_force, F(0.0))
                 stop = wp.clamp(inertia * slip, -limit, limit) / inertia
                 if TWO_PHASE:
@@ -106,11 +106,11 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         result = V2()
         if TWO_PHASE:
             result = V2(
-                parameters.solid_density * change[0] + parameters.liquid_density * change[2],
-                parameters.solid_density * change[1] + parameters.liquid_density * change[3],
+                change[0] + parameters.liquid_ratio * change[2],
+                change[1] + parameters.liquid_ratio * change[3],
             )
         else:
-            result = parameters.solid_density * V2(change[0], change[1])
+            result = V2(change[0], change[1])
         return -mass * result
 
     @wp.func
@@ -119,14 +119,13 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         result = wp.dot(V2(velocity[0], velocity[1]) - surface_velocity, normal)
         if TWO_PHASE:
             liquid = wp.dot(V2(velocity[2], velocity[3]) - surface_velocity, normal)
-            result = parameters.solid_density * result + parameters.liquid_density * liquid
+            result += parameters.liquid_ratio * liquid
         return result > F(0.0)
 
     @wp.func
     def add(grid: Grid, i: wp.int32, j: wp.int32, change: V):
         grid.velocity[i, j] += change
-        if FLIP:
-            grid.increment[i, j] += change
+        receive(grid, i, j, change)
 
     @wp.func
     def record(reactions: wp.array(dtype=wp.float64), surface: wp.int32, force: V2):

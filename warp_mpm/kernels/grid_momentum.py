@@ -18,25 +18,19 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     POROSITY = effects.porosity_update
-    FLIP = effects.transfer == "flip"
+    free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
 
     @wp.func
-    def free_velocity(grid: Grid, parameters: Parameters, i: wp.int32, j: wp.int32, time_step: F) -> V:
-        """Velocities at the end of the step under internal forces and gravity alone, from the momentum."""
-        inverse = F(1.0) / grid.mass[i, j]
-        result = grid.velocity[i, j] * inverse
-        if FLIP:
-            force = grid.force[i, j]
-            g = parameters.gravity
-            solid = inverse / parameters.solid_density
-            if TWO_PHASE:
-                liquid = inverse / parameters.liquid_density
-                result += time_step * V(
-                    force[0] * solid + g[0], force[1] * solid + g[1], force[2] * liquid + g[0], force[3] * liquid + g[1]
-                )
-            else:
-                result += time_step * V(force[0] * solid + g[0], force[1] * solid + g[1])
+    def per_mass(mass: F, parameters: Parameters) -> V:
+        """One over the mass of the phase that each entry of a node's velocity belongs to."""
+        solid = F(1.0) / mass
+        result = V()
+        if TWO_PHASE:
+            liquid = solid / parameters.liquid_ratio
+            result = V(solid, solid, liquid, liquid)
+        else:
+            result = V(solid, solid)
         return result
 
     @wp.func
@@ -45,9 +39,8 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
         Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
         `coefficient` is Q over its value at the initial porosity."""
-        total = parameters.solid_density + parameters.liquid_density
-        solid_share = parameters.solid_density / total
-        liquid_share = parameters.liquid_density / total
+        solid_share = F(1.0) / (F(1.0) + parameters.liquid_ratio)
+        liquid_share = parameters.liquid_ratio * solid_share
         lost = coefficient * parameters.drag_rate * time_step
         if IMPLICIT_DRAG:
             lost = lost / (F(1.0) + lost)
@@ -57,9 +50,15 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def move(grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
-        """From the momentum of every node in use to its velocity (with FLIP: and the increment of that)."""
+        """From the momentum of every node in use to its velocity."""
         worker = wp.tid()
         time_step = F(clock[wp.static(TIME_STEP)])
+        g = parameters.gravity
+        gravity = V()
+        if TWO_PHASE:
+            gravity = V(g[0], g[1], g[0], g[1])
+        else:
+            gravity = V(g[0], g[1])
         for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
             block = grid.active[s / wp.static(BLOCK)]
             bi = block / parameters.block_rows
@@ -69,8 +68,9 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
-                    old = grid.velocity[i, j] / mass
-                    new = free_velocity(grid, parameters, i, j, time_step)
+                    inverse = per_mass(mass, parameters)
+                    old = wp.cw_mul(inverse, grid.velocity[i, j])
+                    new = free_velocity(grid, i, j, inverse, gravity, time_step)
                     if LIQUID_ALONE:
                         if TWO_PHASE:
                             grid.liquid_alone[i, j] = V2(new[2], new[3])
@@ -82,7 +82,6 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             coefficient = grid.drag[i, j] / mass
                         new = dragged(new, coefficient, parameters, time_step)
                     grid.velocity[i, j] = new
-                    if FLIP:
-                        grid.increment[i, j] = new - old
+                    keep(grid, i, j, old, new)
 
     return SimpleNamespace(move=move)

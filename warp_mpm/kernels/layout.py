@@ -109,6 +109,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     array = wp.array
+    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, components=components)
 
     points: dict[str, Any] = {
         "position": array(dtype=V2),
@@ -120,11 +121,6 @@ def layout(effects: Effects) -> SimpleNamespace:
         "gradient": array(dtype=V4),
         "inside": array(dtype=wp.int32),
     }
-    if effects.transfer == "flip":
-        points["advection"] = array(dtype=V2)
-    else:
-        points["affine_x"] = array(dtype=V)
-        points["affine_y"] = array(dtype=V)
     if effects.plasticity:
         points["solid_gap"] = array(dtype=scalar)
     if effects.liquid:
@@ -141,19 +137,18 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.two_phase and not effects.volumetric_smoothing:
         points["liquid_divergence"] = array(dtype=scalar)
 
+    points |= {name: array(dtype=kind) for name, kind in effects.scheme.point_fields(types).items()}
+
     grid: dict[str, Any] = {
-        "mass": array(dtype=scalar, ndim=2),
+        "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
         "shift": array(dtype=wp.float64),  # displacement of the grid along x since the start [m]
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
     }
-    if effects.transfer == "flip":
-        grid["force"] = array(dtype=V, ndim=2)
-        grid["increment"] = array(dtype=V, ndim=2)
     if effects.porosity_update:
-        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient times volume
+        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it.
@@ -165,6 +160,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.density_correction:
         # The same with half a cell more in front of an inclined face, where points come to rest.
         grid["corner_space"] = array(dtype=scalar, ndim=2)
+
+    grid |= {name: array(dtype=kind, ndim=2) for name, kind in effects.scheme.grid_fields(types).items()}
 
     parameters: dict[str, Any] = {
         "spacing": scalar,
@@ -184,8 +181,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "wave_speed": wp.float64,
         "courant_number": wp.float64,
         "largest_stable_step": wp.float64,
-        "pic_rate": scalar,
     }
+    parameters |= dict.fromkeys(effects.scheme.constants, scalar)
     if effects.density_correction:
         parameters["density_correction"] = scalar  # share of the crowding undone per unit of shear strain
     if effects.bulk_viscosity:
@@ -212,6 +209,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         for name in (
             "porosity",
             "true_liquid_density",
+            "filling_ratio",  # mass of liquid that would fill the whole volume, over that of the solid
             "liquid_bulk_modulus",
             "cavitation_pressure",
             "relaxation_rate",
@@ -223,26 +221,16 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.two_phase:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
-        parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
+        parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
+        parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4)
     contact = contact_fields(effects, scalar, V2, V) if effects.bodies else {}
 
-    return SimpleNamespace(
-        effects=effects,
-        scalar=scalar,
-        V2=V2,
-        V3=V3,
-        V4=V4,
-        V=V,
-        S=S,
-        components=components,
-        Points=_structure("Points", points),
-        Grid=_structure("Grid", grid),
-        Parameters=_structure("Parameters", parameters),
-        Bodies=_structure("Bodies", bodies),
-        Contact=_structure("Contact", contact),
-        point_fields=points,
-        grid_fields=grid,
-        body_fields=bodies,
-        contact_fields=contact,
-    )
+    types.Points = _structure("Points", points)
+    types.Grid = _structure("Grid", grid)
+    types.Parameters = _structure("Parameters", parameters)
+    types.Bodies = _structure("Bodies", bodies)
+    types.Contact = _structure("Contact", contact)
+    types.point_fields, types.grid_fields = points, grid
+    types.body_fields, types.contact_fields = bodies, contact
+    return types

@@ -40,8 +40,15 @@ def make_transfer(
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
-    FLIP = effects.transfer == "flip"
-    APIC = effects.transfer == "apic"
+    scheme = types.scheme
+    empty, start, column, deposit, collect = (
+        scheme.clear,
+        scheme.start,
+        scheme.column,
+        scheme.deposit,
+        scheme.collect,
+    )
+    force_share, impulse_share = scheme.force_share, scheme.impulse_share
     CORNERS = effects.smoothing_grid
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
@@ -70,8 +77,7 @@ def make_transfer(
                 j = bj * wp.static(BLOCK) + b
                 grid.mass[i, j] = F(0.0)
                 grid.velocity[i, j] = V()
-                if FLIP:
-                    grid.force[i, j] = V()
+                empty(grid, i, j)
                 if LIQUID_ALONE:
                     grid.liquid_alone[i, j] = V2()
                 if POROSITY:
@@ -96,7 +102,7 @@ def make_transfer(
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, clock: wp.array(dtype=wp.float64)):
-        """Mass, momentum and internal force of the points to the nodes, per unit of each phase's density.
+        """Mass, momentum and internal force of the points to the nodes, the latter two of each phase.
 
         Internal forces per node: solid -sum V (sigma' - (1 - n) p I) grad w, liquid +sum V n p grad w, with p
         compression positive: audit 3.4, action and reaction between the phases included.
@@ -116,7 +122,13 @@ def make_transfer(
         # Grains do not give way: once the voids are closed the same pressure acts on their volume, not on less.
         volume = larger(read(points.volume, p), parameters.grain_share * reference)
         stress = read(points.stress, p)
-        velocity = read(points.velocity, p) * reference
+        mass = reference * parameters.solid_density
+        masses = V()
+        if TWO_PHASE:
+            liquid_mass = reference * parameters.liquid_density
+            masses = V(mass, mass, liquid_mass, liquid_mass)
+        else:
+            masses = V(mass, mass)
         time_step = F(clock[wp.static(TIME_STEP)])
         gravity = V()
         if TWO_PHASE:
@@ -144,14 +156,9 @@ def make_transfer(
             n = porosity(reference, volume, parameters)
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
-        push = volume * parameters.inverse_spacing
-        liquid_force *= parameters.inverse_spacing
-        if APIC:
-            # The nodes receive the momentum at the end of the step: the force's share of it rides along.
-            push *= time_step / parameters.solid_density
-            velocity += reference * time_step * gravity
-            if TWO_PHASE:
-                liquid_force *= time_step / parameters.liquid_density
+        per_cell = parameters.inverse_spacing * force_share(time_step)
+        push = volume * per_cell
+        liquid_force *= per_cell
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push
@@ -164,25 +171,18 @@ def make_transfer(
         else:
             force_x = V(xx, xy)
             force_y = V(xy, yy)
-        # Change of the point's affine velocity field from one node to the next.
-        change_x = V()
-        change_y = V()
-        if APIC:
-            change_x = read(points.affine_x, p) * (parameters.spacing * reference)
-            change_y = read(points.affine_y, p) * (parameters.spacing * reference)
+        momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
 
         # What depends on x alone is formed once per column of nodes.
         for k in range(3):
-            column = wx[k] * velocity + (wx[k] * to_x[k]) * change_x
+            column_momentum = column(wx[k], dx[k], to_x[k], momentum, force_x, change_x)
             column_force = dx[k] * force_x
-            if APIC:
-                column += column_force
             column_slope = wx[k] * force_y
             column_change = wx[k] * change_y
-            column_mass = wx[k] * reference
+            column_mass = wx[k] * mass
             for m in range(3):
                 node = first + k * parameters.rows + m
                 add(grid.mass, node, wy[m] * column_mass)
@@ -190,12 +190,7 @@ def make_transfer(
                     # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
                     ratio = n / parameters.porosity
                     add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
-                if APIC:
-                    value = column + to_y[m] * column_change
-                    add(grid.velocity, node, wy[m] * value + dy[m] * column_slope)
-                else:
-                    add(grid.velocity, node, wy[m] * column)
-                    add(grid.force, node, wy[m] * column_force + dy[m] * column_slope)
+                deposit(grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope)
 
         if LIQUID_ALONE:
             rubbed = wp.bool(False)
@@ -206,10 +201,9 @@ def make_transfer(
                     if near(bodies, body, x - displaced(bodies, body), F(3.0) * parameters.spacing):
                         rubbed = wp.bool(True)
             if rubbed:
-                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.true_liquid_density
-                share = F(1.0)
-                if FLIP:
-                    share = time_step / parameters.solid_density
+                # Of liquid that fills the whole volume, times the mixture's mass over its own.
+                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio
+                share = impulse_share(time_step)
                 along_x = V2(alone, F(0.0)) - share * force_x
                 along_y = V2(F(0.0), alone) - share * force_y
                 for k in range(3):
@@ -268,38 +262,11 @@ def make_transfer(
         along_x = slope_x * parameters.inverse_spacing
         along_y = mean(wx, left_slope, centre_slope, right_slope) * parameters.inverse_spacing
 
-        if FLIP:
-            increment = V()
-            for k in range(3):
-                for m in range(3):
-                    increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
-            pic = wp.min(parameters.pic_rate * time_step, F(1.0))
-            old = read(points.velocity, p)
-            new = old + increment + pic * (smooth - old - increment)
-            if TWO_PHASE:
-                # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
-                decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
-                unseen = V2(
-                    old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
-                    old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
-                )
-                new = V(
-                    new[0],
-                    new[1],
-                    new[0] + smooth[2] - smooth[0] + decay * unseen[0],
-                    new[1] + smooth[3] - smooth[1] + decay * unseen[1],
-                )
-            write(points.velocity, p, new)
-            write(points.advection, p, V2(smooth[0], smooth[1]))
-            fastest = speed_squared(new)
-        else:
-            write(points.velocity, p, smooth)
-            # Moments about the point, not about the middle node.
-            lean_x += (F(0.5) - fx) * smooth
-            lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
-            write(points.affine_x, p, lean_x * (F(4.0) * parameters.inverse_spacing))
-            write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
-            fastest = speed_squared(smooth)
+        # Moments about the point, not about the middle node.
+        lean_x += (F(0.5) - fx) * smooth
+        lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
+        velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
+        fastest = speed_squared(velocity)
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
         if fastest > clock[wp.static(SPEED_MAX)]:
             wp.atomic_max(clock, wp.static(SPEED_MAX), fastest)

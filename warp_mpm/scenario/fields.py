@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
 
 # The outer bounds are far beyond any flow; they keep the arithmetic of a typing error finite.
 Positive = Annotated[float, Field(gt=0.0, le=1e15)]
@@ -25,3 +27,15 @@ class Model(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+
+def set_fields(model: type[Model], fields: Mapping[str, tuple[Any, Any]]) -> None:
+    """Give a model more fields, or other ones of the same name, each an annotation with a default or a FieldInfo.
+
+    Models that hold this one must be built anew (`model_rebuild(force=True)`).
+    """
+    for name, (annotation, default) in fields.items():
+        field = default if isinstance(default, FieldInfo) else FieldInfo.from_annotated_attribute(annotation, default)
+        model.model_fields[name] = field
+        model.__annotations__[name] = annotation
+    model.model_rebuild(force=True)

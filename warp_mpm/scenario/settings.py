@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from warp_mpm.scenario.fields import Coordinate, Friction, Interval, Model, NonNegative
+from warp_mpm.scenario.fields import Coordinate, Friction, Interval, Model, NonNegative, set_fields
+from warp_mpm.simulator.schemes import SCHEMES
 
 STANDARD_GRAVITY = 9.81
 """Gravity [m/s²] to which a hydraulic conductivity refers, whatever the scene's own gravity."""
@@ -61,10 +62,7 @@ class Numerics(Model):
     """Material points in a full cell at t = 0."""
     courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Share of the critical time step that is used, C_NB."""
-    transfer: Literal["flip", "apic"] = "apic"
-    """Velocity transfer between points and grid: affine particle-in-cell, or flip (Sulsky et al. 1995, the paper's)."""
-    pic_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
-    """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
+    transfer: str = "apic"
     drag: Literal["semi_implicit", "explicit"] = "semi_implicit"
     """How the drag between the phases is integrated; explicit limits the time step at low conductivity."""
     volumetric_smoothing: bool = True
@@ -78,6 +76,21 @@ class Numerics(Model):
     """Artificial viscosity on compression, as a share b of rho c d (density, sound speed, spacing); 0 is none."""
     precision: Literal["float64", "float32"] = "float64"
     """Floating-point numbers of the simulation."""
+
+
+def offer_schemes() -> None:
+    """Make `Numerics` take the name of every scheme, and the fields of each."""
+    titles = "; ".join(f"{scheme.name}: {scheme.title}" for scheme in SCHEMES)
+    names = Annotated[
+        Literal[*SCHEMES.names], Field(description=f"Velocity transfer between points and grid. {titles}.")
+    ]
+    fields = {"transfer": (names, Numerics.model_fields["transfer"].default)}
+    for scheme in SCHEMES:
+        fields |= {name: (field.rebuild_annotation(), field) for name, field in scheme.settings.model_fields.items()}
+    set_fields(Numerics, fields)
+
+
+offer_schemes()
 
 
 class Output(Model):

@@ -39,7 +39,7 @@ def kernel_parameters(
         limits: on the time step.
         workers: threads that share the blocks of the grid in use.
     """
-    values = _grid_and_clock(scenario, grid, limits, workers) | _skeleton(scenario, effects, limits)
+    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(scenario, effects, limits)
     if effects.liquid:
         values |= _liquid(scenario, effects, limits)
     if effects.liquid and effects.bodies:
@@ -50,7 +50,9 @@ def kernel_parameters(
     return parameters
 
 
-def _grid_and_clock(scenario: Scenario, grid: GridLayout, limits: StepLimits, workers: int) -> dict[str, Any]:
+def _grid_and_clock(
+    scenario: Scenario, effects: Effects, grid: GridLayout, limits: StepLimits, workers: int
+) -> dict[str, Any]:
     numerics = scenario.numerics
     return {
         "spacing": numerics.spacing_m,
@@ -65,8 +67,7 @@ def _grid_and_clock(scenario: Scenario, grid: GridLayout, limits: StepLimits, wo
         "wave_speed": limits.wave_speed,
         "courant_number": numerics.courant_number,
         "largest_stable_step": limits.drag_step,
-        "pic_rate": numerics.pic_share * (limits.sound_speed / numerics.spacing_m),
-    }
+    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed)
 
 
 def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
     shear = young / (2.0 * (1.0 + nu))
     lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     values: dict[str, Any] = {
-        "solid_density": material.density if effects.formulation == "undrained" else material.solid_partial_density,
+        "solid_density": _moving_density(scenario, effects),
         "lame": lame,
         "shear_modulus": shear,
         "bulk_modulus": lame + 2.0 / 3.0 * shear,
@@ -97,12 +98,19 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[
     return values
 
 
+def _moving_density(scenario: Scenario, effects: Effects) -> float:
+    """Mass per volume of the whole that moves with the solid [kg/m3]."""
+    material = scenario.flow.material
+    return material.density if effects.formulation == "undrained" else material.solid_partial_density
+
+
 def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
     material: Any = scenario.flow.material
     numerics = scenario.numerics
     values = {
         "porosity": material.porosity,
         "true_liquid_density": material.liquid_density_kg_per_m3,
+        "filling_ratio": material.liquid_density_kg_per_m3 / _moving_density(scenario, effects),
         "liquid_bulk_modulus": material.liquid_bulk_modulus_Pa,
         "cavitation_pressure": material.cavitation_pressure_Pa,
         "relaxation_rate": numerics.pressure_relaxation * (limits.sound_speed / numerics.spacing_m),
@@ -112,7 +120,8 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
         coefficient = n**2 * material.liquid_density_kg_per_m3 * STANDARD_GRAVITY / material.hydraulic_conductivity
         values |= {
             "liquid_density": liquid,
-            "drag_coefficient": coefficient,
+            "liquid_ratio": liquid / solid,
+            "drag_per_mass": coefficient / solid,
             "drag_rate": coefficient * (1.0 / solid + 1.0 / liquid),
         }
     return values

@@ -1,0 +1,78 @@
+"""Affine particle-in-cell (Jiang et al. 2015) for quadratic splines."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from .scheme import Scheme
+
+
+class Apic(Scheme):
+    """A point takes the nodes' velocity, and of what that leaves out the part that is linear in the place.
+
+    Nodes receive the momentum at the end of the step: the share of internal force and gravity rides along with it.
+    """
+
+    name = "apic"
+    title = "affine particle-in-cell (Jiang et al. 2015)"
+    keeps_affine_field = True
+
+    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
+        return {"affine_x": types.V, "affine_y": types.V}
+
+    def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+        import warp as wp
+
+        F, V3, V = types.scalar, types.V3, types.V
+        Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
+        read, write, add = tools.read, tools.write, tools.add
+
+        @wp.func
+        def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
+            momentum = wp.cw_mul(masses, read(points.velocity, p)) + time_step * wp.cw_mul(masses, gravity)
+            change_x = parameters.spacing * wp.cw_mul(masses, read(points.affine_x, p))
+            change_y = parameters.spacing * wp.cw_mul(masses, read(points.affine_y, p))
+            return momentum, change_x, change_y
+
+        @wp.func
+        def force_share(time_step: F) -> F:
+            return time_step
+
+        @wp.func
+        def impulse_share(time_step: F) -> F:
+            return F(1.0)
+
+        @wp.func
+        def column(w: F, d: F, to: F, momentum: V, force_x: V, change_x: V) -> V:
+            return w * momentum + (w * to) * change_x + d * force_x
+
+        @wp.func
+        def deposit(grid: Grid, node: wp.int32, w: F, d: F, to: F, column: V, change: V, force: V, slope: V):
+            add(grid.velocity, node, w * (column + to * change) + d * slope)
+
+        @wp.func
+        def collect(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            write(points.velocity, p, smooth)
+            write(points.affine_x, p, lean_x * (F(4.0) * parameters.inverse_spacing))
+            write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
+            return smooth
+
+        return {
+            "start": start,
+            "force_share": force_share,
+            "impulse_share": impulse_share,
+            "column": column,
+            "deposit": deposit,
+            "collect": collect,
+        }

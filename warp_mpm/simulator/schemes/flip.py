@@ -1,0 +1,138 @@
+"""FLIP (Sulsky et al. 1995), with a share of the grid's own velocity that is given as a rate."""
+
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from warp_mpm.scenario.fields import Model
+
+from .scheme import Scheme
+
+
+class Settings(Model):
+    pic_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
+
+
+class Flip(Scheme):
+    """A point adds to its velocity what the nodes gained in the step, and moves with the nodes' velocity."""
+
+    name = "flip"
+    title = "flip (Sulsky et al. 1995, the paper's)"
+    settings = Settings
+    constants = ("pic_rate",)
+
+    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
+        return {"advection": types.V2}
+
+    def grid_fields(self, types: SimpleNamespace) -> dict[str, Any]:
+        return {"force": types.V, "increment": types.V}
+
+    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
+        return {"pic_rate": numerics.pic_share * (sound_speed / numerics.spacing_m)}
+
+    def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+        import warp as wp
+
+        F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
+        Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
+        read, write, add = tools.read, tools.write, tools.add
+        TWO_PHASE = types.effects.two_phase
+
+        @wp.func
+        def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
+            return wp.cw_mul(masses, read(points.velocity, p)), V(), V()
+
+        @wp.func
+        def force_share(time_step: F) -> F:
+            return F(1.0)
+
+        @wp.func
+        def impulse_share(time_step: F) -> F:
+            return time_step
+
+        @wp.func
+        def column(w: F, d: F, to: F, momentum: V, force_x: V, change_x: V) -> V:
+            return w * momentum
+
+        @wp.func
+        def deposit(grid: Grid, node: wp.int32, w: F, d: F, to: F, column: V, change: V, force: V, slope: V):
+            add(grid.velocity, node, w * column)
+            add(grid.force, node, w * force + d * slope)
+
+        @wp.func
+        def clear(grid: Grid, i: wp.int32, j: wp.int32):
+            grid.force[i, j] = V()
+
+        @wp.func
+        def free_velocity(grid: Grid, i: wp.int32, j: wp.int32, inverse: V, gravity: V, time_step: F) -> V:
+            return wp.cw_mul(inverse, grid.velocity[i, j]) + time_step * (
+                wp.cw_mul(inverse, grid.force[i, j]) + gravity
+            )
+
+        @wp.func
+        def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V):
+            grid.increment[i, j] = new - old
+
+        @wp.func
+        def receive(grid: Grid, i: wp.int32, j: wp.int32, change: V):
+            grid.increment[i, j] += change
+
+        @wp.func
+        def collect(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            increment = V()
+            for k in range(3):
+                for m in range(3):
+                    increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
+            pic = wp.min(parameters.pic_rate * time_step, F(1.0))
+            old = read(points.velocity, p)
+            new = old + increment + pic * (smooth - old - increment)
+            if TWO_PHASE:
+                # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
+                decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
+                unseen = V2(
+                    old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
+                    old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
+                )
+                new = V(
+                    new[0],
+                    new[1],
+                    new[0] + smooth[2] - smooth[0] + decay * unseen[0],
+                    new[1] + smooth[3] - smooth[1] + decay * unseen[1],
+                )
+            write(points.velocity, p, new)
+            write(points.advection, p, V2(smooth[0], smooth[1]))
+            return new
+
+        @wp.func
+        def displacement(
+            points: Points, p: wp.int32, grid: Grid, x: V2, shift: F, time_step: F, parameters: Parameters
+        ) -> V2:
+            return time_step * read(points.advection, p)
+
+        return {
+            "start": start,
+            "force_share": force_share,
+            "impulse_share": impulse_share,
+            "column": column,
+            "deposit": deposit,
+            "clear": clear,
+            "free_velocity": free_velocity,
+            "keep": keep,
+            "receive": receive,
+            "collect": collect,
+            "displacement": displacement,
+        }

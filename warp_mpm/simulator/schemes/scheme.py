@@ -1,0 +1,124 @@
+"""What a transfer scheme is: everything that scatter, nodes and gather must be told of it, in one object."""
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from warp_mpm.scenario.fields import Model
+
+if TYPE_CHECKING:
+    from ..step import Launch
+
+
+class Scheme:
+    """A way of bringing velocities from the points to the nodes and back.
+
+    `types` below holds the scalar type, the vectors V2 and V (all velocities at a place) and the structures Points,
+    Grid and Parameters; `tools` the functions `read(array, p)`, `write(array, p, value)`, `add(array, p, value)`,
+    `larger`, `smaller`, `weights(f)`, `slopes(f)` and `cell_of(x, shift, parameters)`.
+    """
+
+    name: ClassVar[str]
+    """In the scenario: `numerics.transfer`."""
+    title: ClassVar[str]
+    """What it is, in a clause, with its source."""
+    settings: ClassVar[type[Model]] = Model
+    """Its fields in `numerics`, each with a default, limits and a docstring."""
+    constants: ClassVar[tuple[str, ...]] = ()
+    """Numbers that its functions read from the parameters."""
+    keeps_affine_field: ClassVar[bool] = False
+    """Whether a point alone on its nodes keeps its rate of strain from step to step, which makes it more stable
+    (`time_step.lone_point_courant_number`)."""
+
+    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
+        """What a point stores for it: Warp types by name. All begin at 0."""
+        return {}
+
+    def grid_fields(self, types: SimpleNamespace) -> dict[str, Any]:
+        """What a node stores for it: Warp types by name."""
+        return {}
+
+    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
+        """Values of `constants`.
+
+        Args:
+            numerics: of the scenario, with the fields of `settings`.
+            sound_speed: in the material as a whole [m/s].
+        """
+        return {}
+
+    def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+        """Its functions for the common kernels. Needed are
+
+        - `start(points, p, masses: V, gravity: V, time_step, parameters) -> V, V, V`: momentum of a point, and by how
+          much that changes from one node to the next along x and along y;
+        - `force_share(time_step)`: what the force on the nodes is multiplied by before it is spread, and
+          `impulse_share(time_step)`: what such a force must be multiplied by to be the impulse of the step;
+        - `column(w, d, to, momentum, force_x, change_x) -> V`: the point's share in a column of nodes, with the weight
+          and its slope along x and the way to the column in cells;
+        - `deposit(grid, node, w, d, to, column, change, force, slope)`: the share of a node in that, with weight, slope
+          and way along y; `change` and `force` of the column, `slope` the force along y, each times the column's weight
+          or slope;
+        - `collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters) -> V`: writes the
+          point's velocity and returns it. `first` is the lowest of its nodes, `smooth` the nodes' velocity at the
+          point, `lean_x` and `lean_y` its first moments about the point, in cells.
+
+        and, unless the default does,
+
+        - `clear(grid, i, j)`: empties the scheme's own fields at a node (default: it has none);
+        - `free_velocity(grid, i, j, inverse: V, gravity: V, time_step) -> V`: velocity at the end of the step without
+          drag and contact, `inverse` being 1 over each phase's mass (default: the momentum has it all);
+        - `keep(grid, i, j, old: V, new: V)`: velocities before and after (default: forgotten);
+        - `receive(grid, i, j, change: V)`: what contact changes (default: nothing beside the velocity);
+        - `displacement(points, p, grid, x, shift, time_step, parameters) -> V2`: of a point in the step (default: with
+          the solid's velocity).
+        """
+        raise NotImplementedError
+
+    def kernels(self, types: SimpleNamespace, tools: SimpleNamespace, module: str) -> dict[str, Any]:
+        """Kernels of its own, by name."""
+        return {}
+
+    def launches(self) -> "tuple[tuple[str, Launch], ...]":
+        """Launches of these, each with the name of the kernel after which it comes."""
+        return ()
+
+
+def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+    """The functions of a scheme, defaults filled in."""
+    import warp as wp
+
+    F, V2, V = types.scalar, types.V2, types.V
+    Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
+    read = tools.read
+
+    @wp.func
+    def clear(grid: Grid, i: wp.int32, j: wp.int32):
+        pass
+
+    @wp.func
+    def free_velocity(grid: Grid, i: wp.int32, j: wp.int32, inverse: V, gravity: V, time_step: F) -> V:
+        return wp.cw_mul(inverse, grid.velocity[i, j])
+
+    @wp.func
+    def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V):
+        pass
+
+    @wp.func
+    def receive(grid: Grid, i: wp.int32, j: wp.int32, change: V):
+        pass
+
+    @wp.func
+    def displacement(
+        points: Points, p: wp.int32, grid: Grid, x: V2, shift: F, time_step: F, parameters: Parameters
+    ) -> V2:
+        v = read(points.velocity, p)
+        return time_step * V2(v[0], v[1])
+
+    defaults = {
+        "clear": clear,
+        "free_velocity": free_velocity,
+        "keep": keep,
+        "receive": receive,
+        "displacement": displacement,
+    }
+    return defaults | scheme.functions(types, tools)

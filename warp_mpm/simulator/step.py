@@ -1,0 +1,85 @@
+"""The order of a step: which kernels are launched, over what, and with what, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from ..effects import Effects
+from .bodies import Body, Sliding
+from .bodies.arrays import passes
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One launch of a kernel."""
+
+    kernel: str
+    over: Literal["one", "workers", "points", "places", "groups"]
+    """What its threads count: workers share the blocks of the grid in use; places and groups are a body's."""
+    takes: tuple[str, ...]
+    """Its arguments, by the names under which the simulation knows them."""
+    does: str
+    """What it does, in a clause."""
+    of: str = ""
+    """The body that it acts for."""
+
+
+START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies"), "begins an interval")
+LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "sums"), "sums over the points, for a sample")
+
+
+def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
+    """The kernels of a step for `effects`, in their order; a scheme's own ones stand where it says."""
+    grid = ("grid", "parameters", "clock")
+    points = ("points", "grid", "parameters", "bodies", "clock")
+    step = [
+        Launch("clear", "workers", ("grid", "parameters"), "empties the blocks that were in use"),
+        Launch("forget", "one", ("grid",), "empties their list"),
+        Launch("scatter", "points", points, "mass, momentum and internal force of the points to the nodes"),
+        Launch("move", "workers", grid, "velocities of the nodes at the end of the step, drag included"),
+    ]
+    for body in bodies:
+        step += _contact(body, passes(body, bodies))
+    step.append(
+        Launch(
+            "gather", "points", ("points", *grid), "velocities and their gradients to the points, strains to corners"
+        )
+    )
+    if effects.smoothing_grid:
+        step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
+    step += [
+        Launch("advect", "points", (*points, "counters", "limiters", "left"), "moves the points"),
+        Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
+        Launch("bound", "points", ("points", "parameters", "clock", "limiters"), "limits that few points come to"),
+        Launch(
+            "tick",
+            "one",
+            ("parameters", "clock", "counters", "running", "reactions", "left", "balance", "bodies", "grid"),
+            "time, the bodies' places and the next step's length",
+        ),
+    ]
+    return _inserted(step, effects.scheme.launches())
+
+
+def _contact(body: Body, passing: bool) -> list[Launch]:
+    """Contact of the flow with one body."""
+    seen = ("contact", "bodies", "grid", "parameters")
+    found = [Launch("place", "places", seen, "finds the nodes of a body that passes", body.name)] if passing else []
+    if isinstance(body.motion, Sliding):
+        takes = ("contact", "bodies", "parameters", "clock", "counters")
+        return [
+            *found,
+            Launch("collect", "places", seen, "what the body's surface sees of the flow", body.name),
+            Launch("slide", "one", takes, "the body's velocity, together with the contact", body.name),
+            Launch("push", "places", (*seen, "clock", "reactions"), "contact with the body", body.name),
+        ]
+    return [*found, Launch("press", "groups", (*seen, "clock", "reactions"), "contact with the body", body.name)]
+
+
+def _inserted(step: list[Launch], own: Iterable[tuple[str, Launch]]) -> tuple[Launch, ...]:
+    """The step with more launches, each after the kernel that is named with it."""
+    for after, launch in own:
+        step.insert(1 + [one.kernel for one in step].index(after), launch)
+    return tuple(step)
