@@ -195,7 +195,7 @@ def make_body_functions(types: SimpleNamespace) -> SimpleNamespace:
         """Whether `place`, seen from the body, lies inside it or within `reach` [m] of it."""
         result = wp.bool(False)
         if within(bodies.box[body], place, reach):
-            distance, _, _ = nearest(
+            distance, _normal, _piece = nearest(
                 bodies.begin, bodies.along, bodies.low, bodies.high, bodies.normal, bodies.offset,
                 bodies.first_piece[body], bodies.first_piece[body + 1], place,
             )  # fmt: skip
@@ -209,7 +209,7 @@ def make_body_functions(types: SimpleNamespace) -> SimpleNamespace:
         for body in range(bodies.count):
             seen = place - (displaced(bodies, body) + travel(bodies, body, time_step))
             if within(bodies.box[body], seen, depth):
-                distance, normal, _ = nearest(
+                distance, normal, _piece = nearest(
                     bodies.begin, bodies.along, bodies.low, bodies.high, bodies.normal, bodies.offset,
                     bodies.first_piece[body], bodies.first_piece[body + 1], seen,
                 )  # fmt: skip
@@ -259,7 +259,7 @@ def make_place(types: SimpleNamespace, functions: SimpleNamespace, module: str) 
         mirror = wp.vec2i(-1, -1)
         if i >= 0 and i < parameters.columns and j >= 0 and j < parameters.rows:
             seen = origin + spacing * V2(F(i) + F(0.5), F(j) + F(0.5)) - at
-            distance, _, piece = nearest(
+            distance, _direction, piece = nearest(
                 contact.begin, contact.along, contact.low, contact.high, contact.normals, contact.offset,
                 0, contact.first_piece[1], seen,
             )  # fmt: skip
