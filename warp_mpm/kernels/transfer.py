@@ -53,6 +53,7 @@ def make_transfer(
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
+    EXTRA_STRESS = effects.skeleton.extra_stress
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
     GROUND_FRICTION = effects.ground == "frictional"
     BARRIER_FRICTION = effects.barrier_friction
@@ -158,6 +159,8 @@ def make_transfer(
         per_cell = parameters.inverse_spacing * force_share(time_step)
         push = volume * per_cell
         liquid_force *= per_cell
+        if EXTRA_STRESS:
+            stress += read(points.extra_stress, p)
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push
@@ -189,9 +192,7 @@ def make_transfer(
                     # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
                     ratio = n / parameters.porosity
                     add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
-                deposit(
-                    grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope
-                )
+                deposit(grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope)
 
         if LIQUID_ALONE:
             rubbed = wp.bool(False)

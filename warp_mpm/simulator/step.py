@@ -41,16 +41,18 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     if effects.barrier != "none":
         step.append(Launch("collect", "contacts", ("contact", *grid), "what the barrier's surface sees of the flow"))
         if effects.barrier == "sliding":
-            takes = ("contact", "contact_count", "parameters", "clock", "counters")
-            step.append(Launch("slide", "one", takes, "the barrier's velocity, together with the contact"))
+            mover = ("contact", "contact_count", "parameters", "clock", "counters")
+            step.append(Launch("slide", "one", mover, "the barrier's velocity, together with the contact"))
         step.append(Launch("barrier", "contacts", ("contact", *grid, "reactions"), "contact with the barrier"))
     step.append(Launch("gather", "points", points, "velocities and their gradients to the points, strains to corners"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
+    takes = ("points", "parameters", "clock")
     step += [
         Launch("advect", "points", (*points, "counters", "left"), "moves the points"),
-        Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
-        Launch("bound", "points", ("points", "parameters", "clock"), "limits that few points come to"),
+        Launch("update", "points", takes, "strain, effective stress and pore pressure"),
+        *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
+        Launch("bound", "points", takes, "limits that few points come to"),
         Launch(
             "tick",
             "one",
