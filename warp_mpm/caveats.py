@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from warp_mpm.scenario import Prescribed, Scenario
+from warp_mpm.simulator.laws import LAWS
 
 LEAST_CELLS = 4.0
 """Cells over the flow's depth below which even peak forces were a tenth off (case 1 at 3.75: 11 %)."""
@@ -35,6 +36,7 @@ def scene_caveats(scenario: Scenario) -> list[str]:
     grains = flow.material.grain_density_kg_per_m3
     if grains < WATER:
         found.append(f"flow.material.grain_density_kg_per_m3 = {grains:g} is lighter than water; rock has about 2650.")
+    found += LAWS.named(flow.material.law).caveats(flow.material)
     driven = scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed)
     if scenario.barrier is not None and not driven and not _can_arrive(scenario):
         found.append(

@@ -8,6 +8,7 @@ from typing import Any
 
 from .effects import Effects
 from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .simulator.laws import LAWS
 from .simulator.schemes import SCHEMES
 
 
@@ -47,12 +48,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
     return [
         Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
-        Rule(
-            "plasticity",
-            flow.material.plasticity,
-            _setting("flow.material.plasticity", flow.material.plasticity),
-            {"flow.material.plasticity": not flow.material.plasticity},
-        ),
+        Rule("law", LAWS.key(flow.material.law), f"flow.material.law = {flow.material.law}", _another_law(scenario)),
         Rule(
             "drag",
             drag,
@@ -172,6 +168,30 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
         formulation = "dry"
     kept = {name: value for name, value in material.items() if name not in dropped}
     return {"flow": flow | {"formulation": formulation, "material": kept}}
+
+
+def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
+    """Changes that give the skeleton another law and leave all else, the initial stress too, as it is.
+
+    Args:
+        scenario: the scene.
+        law: name of the other one.
+        own: its fields; what is left out has its default.
+    """
+    flow = scenario.resolved()["flow"]
+    dropped = {"law", *LAWS.named(scenario.flow.material.law).Settings.model_fields}
+    kept = {name: value for name, value in flow["material"].items() if name not in dropped}
+    changed = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio}
+    return {"flow": flow | changed | {"material": kept | {"law": law, **own}}}
+
+
+def _another_law(scenario: Scenario) -> dict[str, Any]:
+    """Changes to the first other law that needs no figure which the scene does not give; none where there is none."""
+    for law in LAWS:
+        needed = any(field.is_required() for field in law.Settings.model_fields.values())
+        if law.name != scenario.flow.material.law and not needed:
+            return with_law(scenario, law.name)
+    return {}
 
 
 def _setting(name: str, value: bool) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from .simulator.laws import DEFAULT, LAWS, Law
 from .simulator.schemes import SCHEMES, Scheme
 
 
@@ -20,8 +21,8 @@ class Effects:
     """Dry and undrained: one velocity field. Two-phase: solid and liquid velocities (a_S-a_L formulation)."""
     precision: Literal["float64", "float32"] = "float64"
     """Scalar type of points and grid; time, ledger and barrier are float64 throughout."""
-    plasticity: bool = True
-    """Mohr-Coulomb with tension cut-off; off: linear elastic."""
+    law: str = DEFAULT
+    """Key of the law of the skeleton."""
     volumetric_smoothing: bool = True
     """Volume strain rates averaged over the cells' corners (anti-locking)."""
     density_correction: bool = False
@@ -51,6 +52,11 @@ class Effects:
     def liquid(self) -> bool:
         """Pore pressure exists."""
         return self.formulation != "dry"
+
+    @property
+    def skeleton(self) -> Law:
+        """The law of the skeleton."""
+        return LAWS.keyed(self.law)
 
     @property
     def scheme(self) -> Scheme:
@@ -84,11 +90,10 @@ class Effects:
     @property
     def module_name(self) -> str:
         """Name of the Warp module: one per set of effects."""
-        flags: list[str] = [self.formulation, self.precision, self.transfer, self.drag]
+        flags: list[str] = [self.formulation, self.precision, self.law, self.transfer, self.drag]
         flags += [
             name
             for name in (
-                "plasticity",
                 "volumetric_smoothing",
                 "density_correction",
                 "pressure_relaxation",

@@ -82,7 +82,7 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
     location, kind, value = problem["loc"], problem["type"], problem["input"]
     if kind == "missing" and isinstance(location[-1], int):  # of a list that is too short the whole is shown
         location, kind = location[:-1], "too_short"
-    path, annotation, owner, tag = _walk(location, model)
+    path, annotation, owner, tags = _walk(location, model)
     if kind == "missing":
         yield f"{path} is missing; it must be given{_range_of(annotation, ' as ')}."
     elif kind == "extra_forbidden":
@@ -91,7 +91,7 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
         # A name that another kind of scene knows is no slip of the pen.
         close = [] if name in _all_names(model) else difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {close[0]}?" if close else f"allowed are {', '.join(known)}."
-        where = f", where {tag[0]} is {json.dumps(tag[1])}" if tag else ""
+        where = ", where " + " and ".join(f"{field} is {json.dumps(value)}" for field, value in tags) if tags else ""
         yield f"{path} is not a field of a scenario{where}; {hint}"
     elif kind == "union_tag_not_found":
         yield f"{path} needs the field {problem['ctx']['discriminator']}; it must be one of {_tags(annotation)}."
@@ -112,9 +112,11 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
 
 def _walk(
     location: tuple[int | str, ...], model: type[BaseModel]
-) -> tuple[str, Any, type[BaseModel] | None, tuple[str, str] | None]:
-    """The path as a user writes it, the annotation at its end, the model that holds its last part and of which kind."""
-    path, annotation, owner, tag = "", typing.cast(Any, model), None, None
+) -> tuple[str, Any, type[BaseModel] | None, list[tuple[str, str]]]:
+    """The path as a user writes it, the annotation at its end, the model that holds its last part and of which kinds
+    that and those around it are."""
+    path, annotation, owner = "", typing.cast(Any, model), None
+    tags: list[tuple[str, str]] = []
     for part in location:
         if isinstance(part, int):
             path += f"[{part}]"
@@ -129,13 +131,13 @@ def _walk(
         tagged = [member for member in members if part in _tags_of(member)]
         if tagged and len(members) > 1:  # the tag that pydantic puts into the location, no part of the user's path
             annotation = tagged[0]
-            tag = (next(name for name in _TAG_FIELDS if name in tagged[0].model_fields), part)
+            tags.append((next(name for name in _TAG_FIELDS if part in _values_of(tagged[0], name)), part))
             continue
         owner = members[0] if members else None
         path += f".{part}" if path else part
         field = owner.model_fields.get(part) if owner is not None else None
         annotation = Any if field is None else field.rebuild_annotation()
-    return path, annotation, owner, tag
+    return path, annotation, owner, tags
 
 
 def _all_names(model: type[BaseModel]) -> set[str]:
@@ -174,10 +176,12 @@ def _members(annotation: Any) -> list[Any]:
 
 
 def _tags_of(model: type[BaseModel]) -> tuple[Any, ...]:
-    for name in _TAG_FIELDS:
-        if name in model.model_fields:
-            return typing.get_args(model.model_fields[name].annotation)
-    return ()
+    return next((values for name in _TAG_FIELDS if (values := _values_of(model, name))), ())
+
+
+def _values_of(model: type[BaseModel], field: str) -> tuple[Any, ...]:
+    """What a field of fixed values may be; nothing where the model does not have it."""
+    return typing.get_args(model.model_fields[field].annotation) if field in model.model_fields else ()
 
 
 def _tags(annotation: Any) -> str:
@@ -220,7 +224,7 @@ def _range_of(annotation: Any, prefix: str = "") -> str:
     return prefix + words if words else ""
 
 
-_TAG_FIELDS = ("kind", "formulation")
+_TAG_FIELDS = ("kind", "formulation", "law")
 """Fields that tell which of several models a group is."""
 
 _BOUNDS: dict[type, tuple[str, str]] = {

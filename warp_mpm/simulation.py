@@ -29,7 +29,7 @@ from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, point_arrays
-from .state.divergence import NAMES, SimulationDiverged, what_diverged
+from .state.divergence import SimulationDiverged, diverging, what_diverged
 from .state.parameters import kernel_parameters
 from .state.samples import BarrierNow, Constants, Totals, sample
 from .time_step import step_limits
@@ -282,8 +282,10 @@ class Simulation:
         return spent
 
     def _what_diverged(self) -> str:
+        names = diverging(self.effects)
         return what_diverged(
-            {name: self._point_arrays[name].numpy() for name in NAMES if name in self._point_arrays},
+            {name: self._point_arrays[name].numpy() for name in names if name in self._point_arrays},
+            names,
             time=self.time,
             steps=self.steps,
             barrier_velocity=self.barrier_velocity,
@@ -402,7 +404,8 @@ class Simulation:
 
         `position`, `solid_velocity`, `liquid_velocity` [N, 2] (the last with two phases only); `effective_stress`
         [N, 4] (xx, yy, zz, xy, tension positive); `pore_pressure` (compression positive; not if dry), `porosity`,
-        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N].
+        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N]. What the law or the transfer scheme
+        keeps at a point besides, and has a meaning for, comes when it is named.
         """
         inside = self._point_arrays["inside"].numpy() > 0
         rows = slice(None) if inside.all() else inside
@@ -436,7 +439,9 @@ class Simulation:
             quantities["pore_pressure"] = lambda: np.maximum(
                 -material.liquid_bulk_modulus_Pa * stored("liquid_strain"), -material.cavitation_pressure_Pa
             )
-        return {name: quantities[name]() for name in (quantities if names is None else names)}
+        shown = quantities if names is None else names
+        own = {**self.effects.skeleton.point_fields, **self.effects.scheme.point_fields}
+        return {name: stored(name) if name in own else quantities[name]() for name in shown}
 
     def _totals(self) -> Totals:
         base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
@@ -490,6 +495,7 @@ class Simulation:
             "steps": int(counters[at.STEPS]),
             "steps_limited_by_wave": int(counters[at.LIMIT_WAVE]),
             "steps_limited_by_drag": int(counters[at.LIMIT_DRAG]),
+            "steps_limited_by_law": int(counters[at.LIMIT_LAW]),
             "steps_limited_by_output": int(counters[at.LIMIT_OUTPUT]),
             "time_step_min": float(clock[at.SMALLEST_TIME_STEP]),
             "time_step_max": float(clock[at.LARGEST_TIME_STEP]),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .scenario import STANDARD_GRAVITY, Scenario, TwoPhaseFlow, UndrainedFlow, UndrainedMaterial
+from .simulator.laws import LAWS
 from .simulator.schemes import SCHEMES, Scheme
 
 
@@ -23,6 +24,13 @@ class StepLimits:
     """Speed of sound in the material as a whole [m/s], without drag between its phases where there are two."""
     drag_step: float
     """Largest stable step of explicitly integrated drag and waves together [s]; infinite where drag is implicit."""
+    law_step: float = math.inf
+    """Largest stable step of the skeleton's law [s]; infinite where waves alone bound it."""
+
+    @property
+    def largest_step(self) -> float:
+        """Largest stable step [s] beside that of waves."""
+        return min(self.drag_step, self.law_step)
 
 
 def undrained_wave_speed(oedometric_modulus: float, liquid_stiffness: float, density: float) -> float:
@@ -106,15 +114,18 @@ def lone_point_courant_number(poisson_ratio: float, scheme: Scheme, slopes: floa
     return math.sqrt(2.0 * (1.0 - poisson_ratio) / (slopes - kept))
 
 
+def moving_density(scenario: Scenario) -> float:
+    """Mass per volume of the whole that moves with the solid [kg/m3]: all of it where both phases move as one."""
+    material = scenario.flow.material
+    return material.density if isinstance(scenario.flow, UndrainedFlow) else material.solid_partial_density
+
+
 def _lone_point_speed(scenario: Scenario, sound: float) -> float:
     """Speed [m/s] that stands in for a lone point's limit; 0 where it cannot swing, because it bears no tension."""
     material, scheme = scenario.flow.material, SCHEMES.named(scenario.numerics.transfer)
     speed = 0.0
-    if not material.plasticity or (material.tension_cutoff_Pa > 0.0 and material.cohesion_Pa > 0.0):
-        density = material.solid_partial_density
-        if isinstance(scenario.flow, UndrainedFlow):
-            density = material.density
-        skeleton = math.sqrt(material.oedometric_modulus / density)
+    if LAWS.named(material.law).bears_tension(material):
+        skeleton = math.sqrt(material.oedometric_modulus / moving_density(scenario))
         speed = skeleton / lone_point_courant_number(material.poisson_ratio, scheme)
     if isinstance(material, UndrainedMaterial) and material.cavitation_pressure_Pa > 0.0:
         speed = max(speed, sound / lone_point_courant_number(0.5, scheme))
@@ -151,4 +162,7 @@ def step_limits(scenario: Scenario) -> StepLimits:
         sound = undrained_wave_speed(flow.material.oedometric_modulus, 0.0, flow.material.density)
     viscosity = numerics.bulk_viscosity
     fastest = max(sound, _lone_point_speed(scenario, sound))
-    return StepLimits(fastest * (viscosity + math.hypot(1.0, viscosity)), sound, drag)
+    law_step = LAWS.named(flow.material.law).largest_step(
+        flow.material, spacing=numerics.spacing_m, density=moving_density(scenario)
+    )
+    return StepLimits(fastest * (viscosity + math.hypot(1.0, viscosity)), sound, drag, law_step)

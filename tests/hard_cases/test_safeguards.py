@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from warp_mpm.effect_rules import with_law
 from warp_mpm.hard_cases.collection import hard_cases
 from warp_mpm.hard_cases.measure import measure
 from warp_mpm.scenario import Scenario
@@ -110,7 +111,6 @@ def overshoot(bulk_viscosity):
         "initial_stress": "zero",
         "lateral_stress_coefficient": None,
     }
-    data["flow"]["material"]["plasticity"] = False
     data |= {
         "barrier": None,
         "gravity": {"acceleration_m_per_s2": 0.0},
@@ -118,6 +118,7 @@ def overshoot(bulk_viscosity):
     }
     data["numerics"] |= {"spacing_m": 0.1, "bulk_viscosity": bulk_viscosity}
     scenario = Scenario.model_validate(data)
+    scenario = scenario.replaced(with_law(scenario, "elastic"))
     simulation = Simulation(scenario)
     simulation.advance(0.6 * height / step_limits(scenario).sound_speed)
     points = simulation.points()

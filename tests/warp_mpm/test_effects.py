@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_mpm.effect_rules import effect_rules
+from warp_mpm.effect_rules import effect_rules, with_law
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation, derive_effects
 from warp_mpm.time_step import step_limits
@@ -175,7 +175,7 @@ WITHOUT_INFLUENCE = {
     "yield stress far beyond reach": (
         "case_1_dry",
         {"flow.material.cohesion_Pa": 1e12, "flow.material.tension_cutoff_Pa": 1e12},
-        {"flow.material.plasticity": False},
+        with_law(Scenario.load(SCENES / "case_1_dry.json"), "elastic"),
     ),
     "walls and ceiling far away": (
         "case_1_dry",

@@ -94,7 +94,7 @@ def test_command(tmp_path, monkeypatch):
     for words in (
         "flow.formulation = dry",
         "there is no liquid",
-        "plasticity",
+        "flow.material.law = mohr_coulomb",
         "points.stress",
         "set by the wave limit",
     ):

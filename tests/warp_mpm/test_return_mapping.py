@@ -10,8 +10,9 @@ import warp as wp
 from scipy.optimize import minimize
 
 from warp_mpm.effects import Effects
+from warp_mpm.kernels.elementary import make_elementary
 from warp_mpm.kernels.layout import layout
-from warp_mpm.kernels.mohr_coulomb import make_return_mapping, yield_constants
+from warp_mpm.simulator.laws.mohr_coulomb import make_return_mapping, yield_constants
 
 YOUNG, POISSON = 2e6, 0.25
 SHEAR = YOUNG / (2.0 * (1.0 + POISSON))
@@ -33,7 +34,7 @@ MATERIALS = {
 def mapped():
     """Function of material and trial stresses [N, 4] (xx, yy, zz, xy) that gives the kernel's stresses and openings."""
     types = layout(Effects("dry"))
-    return_mapping = make_return_mapping(types)
+    return_mapping = make_return_mapping(types, make_elementary(types))
     Parameters, V4 = types.Parameters, types.V4
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from warp_mpm.effect_rules import with_law
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.schemes import SCHEMES
 from warp_mpm.time_step import (
     biot_wave_speeds,
     explicit_drag_step,
@@ -108,10 +110,10 @@ def growth_of_a_lone_point(load_scene, transfer, place, step):
         "velocity_m_per_s": [0.0, 0.0],
         "initial_stress": "zero",
     }
-    data["flow"]["material"]["plasticity"] = False
     data["numerics"] |= {"spacing_m": 0.25, "points_per_cell": 1, "transfer": transfer, "bulk_viscosity": 0.0}
     data["numerics"]["courant_number"] = step
     scenario = Scenario.model_validate(data)
+    scenario = scenario.replaced(with_law(scenario, "elastic"))
     simulation = Simulation(scenario)
     sound = step_limits(scenario).sound_speed
     simulation._parameters.wave_speed = sound  # the step of a full grid
@@ -126,18 +128,20 @@ def growth_of_a_lone_point(load_scene, transfer, place, step):
 def test_limit_of_a_lone_point(load_scene, transfer, place):
     """Just below the limit that its place in the cell gives it does not grow, just above it does."""
     slopes = 4.0 + (1.0 - 2.0 * place) ** 2 / (0.5 + place - place**2)
-    limit = lone_point_courant_number(0.25, transfer, slopes)
+    scheme = SCHEMES.named(transfer)
+    limit = lone_point_courant_number(0.25, scheme, slopes)
     assert growth_of_a_lone_point(load_scene, transfer, place, 0.97 * limit) < 10.0
     assert growth_of_a_lone_point(load_scene, transfer, place, 1.05 * limit) > 1e3
-    assert limit >= lone_point_courant_number(0.25, transfer)
+    assert limit >= lone_point_courant_number(0.25, scheme)
 
 
 def test_lone_points_count_where_there_is_tension(load_scene):
     """An elastic flow takes the step that a lone point bears; one without tension is not slowed by it."""
     plain = step_limits(load_scene("case_1_dry"))
-    elastic = step_limits(load_scene("case_1_dry", **{"flow.material.plasticity": False}))
+    elastic = step_limits(load_scene("case_1_dry", **with_law(load_scene("case_1_dry"), "elastic")))
     cohesive = {"flow.material.cohesion_Pa": 1e4, "flow.material.tension_cutoff_Pa": 5e3}
-    assert elastic.wave_speed == pytest.approx(plain.wave_speed / lone_point_courant_number(0.25, "apic"), rel=1e-12)
+    alone = lone_point_courant_number(0.25, SCHEMES.named("apic"))
+    assert elastic.wave_speed == pytest.approx(plain.wave_speed / alone, rel=1e-12)
     assert step_limits(load_scene("case_1_dry", **cohesive)) == elastic
     wet = step_limits(load_scene("case_1", **{"flow.material.cavitation_pressure_Pa": 1e5}))
     assert wet.wave_speed == pytest.approx(2.0 * step_limits(load_scene("case_1")).wave_speed, rel=1e-12)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from warp_mpm.accuracy.keys import run_key
-from warp_mpm.scenario import DryFlow, Scenario, TwoPhaseFlow, UndrainedFlow
+from warp_mpm.effect_rules import with_law, without_liquid
+from warp_mpm.scenario import DryFlow, Scenario, TwoPhaseFlow
 
 SERIES_INTERVAL = 0.01
 """Interval of the forces [s]: a peak force is the greatest mean over it."""
@@ -106,11 +107,12 @@ def without_effects(scenario: Scenario) -> dict[str, Scenario]:
     found: dict[str, Scenario] = {}
     flow = scenario.flow
     if isinstance(flow, TwoPhaseFlow):
-        found["undrained"] = _as(scenario, UndrainedFlow, "undrained")
+        found["undrained"] = scenario.replaced(without_liquid(scenario))
     if not isinstance(flow, DryFlow):
-        found["dry"] = _as(scenario, DryFlow, "dry")
-    if flow.material.plasticity:
-        found["elastic"] = scenario.replaced({"flow.material.plasticity": False})
+        undrained = found.get("undrained", scenario)
+        found["dry"] = undrained.replaced(without_liquid(undrained))
+    if flow.material.law != "elastic":
+        found["elastic"] = scenario.replaced(with_law(scenario, "elastic"))
     if scenario.barrier is not None and scenario.barrier.motion.kind == "sliding":
         found["fixed"] = scenario.replaced({"barrier.motion": {"kind": "fixed"}})
     return found
@@ -147,13 +149,3 @@ def level_text(level: Any) -> str:
     if isinstance(level, bool):
         return "on" if level else "off"
     return f"{level:g}" if isinstance(level, float) else str(level)
-
-
-def _as(scenario: Scenario, kind: Any, formulation: str) -> Scenario:
-    """The flow in another formulation, without what that one does not know."""
-    data = scenario.resolved()
-    known = kind.model_fields["material"].annotation.model_fields
-    flow = data["flow"]
-    flow["formulation"] = formulation
-    flow["material"] = {name: value for name, value in flow["material"].items() if name in known}
-    return Scenario.model_validate(data)

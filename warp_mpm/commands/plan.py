@@ -58,7 +58,7 @@ def plan(
             )
     if as_json:
         told = asdict(card) | {"wall_time": card.wall_time, "limit": card.limit}
-        told["drag_step"] = card.drag_step if card.drag_step < float("inf") else None
+        told |= {name: told[name] if told[name] < float("inf") else None for name in ("drag_step", "law_step")}
         told["rules"] = [asdict(rule) | {"on": rule.on} for rule in card.rules]
         typer.echo(json.dumps(told | {"what_if": [asdict(switch) for switch in switches]}, indent=2))
         return
@@ -107,7 +107,7 @@ def _print_size(console: Console, card: Plan) -> None:
     whole = sum(card.arrays.values()) / 1e6
     columns, rows = card.cells
     points = megabytes("points")
-    limit = f"{card.limit} limit, {min(card.wave_step, card.drag_step):.3g} s at the flow's initial speed"
+    limit = f"{card.limit} limit, {card.largest_step:.3g} s at the flow's initial speed"
     table = Table(title="\nSize and time", title_justify="left", show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_row("material points", f"{card.material_points:,}, {1e6 * points / card.material_points:.0f} bytes each")
     table.add_row("grid", f"{columns:,} x {rows:,} cells, {card.blocks_in_use:.1%} of its blocks in use at the start")

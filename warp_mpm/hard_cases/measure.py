@@ -18,6 +18,7 @@ from warp_mpm.results import Snapshot
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
 from warp_mpm.simulator.bodies.of_scene import barrier_body
+from warp_mpm.simulator.laws import LAWS
 from warp_mpm.summary import impact_figures, momentum_error
 from warp_mpm.time_step import step_limits
 
@@ -75,7 +76,9 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
         "porosity_low": -1.0
     }
     measured = Measured({"diverged": 0.0})
-    undecided_energy = _undecided_energy(scenario, _snapshot(simulation))
+    material, begin = scenario.flow.material, _snapshot(simulation)
+    law = LAWS.named(material.law)
+    undecided_energy = law.undecided_energy(material, begin["volume"], begin["effective_stress"])
     series, snapshots = Schedule(output.time_series_interval_s), Schedule(output.snapshot_interval_s)
     try:
         while True:
@@ -110,10 +113,11 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
             "wall_time": time.perf_counter() - started,
         }
     )
-    if scenario.flow.material.plasticity:
+    strength = law.strength(material)
+    if math.isfinite(strength):
         # A skeleton is stopped in free fall, between two samples of the speed.
         fastest = max(measured.figures["speed_max"], impact_speed(scenario))
-        bound = pressure_bound(scenario, fastest) + 2.0 * scenario.flow.material.cohesion_Pa
+        bound = pressure_bound(scenario, fastest) + 2.0 * strength
         measured.figures["stress_ratio"] = measured.figures["stress_max"] / max(bound, 1.0)
     measured.figures["yield_excess"] /= max(measured.figures["stress_max"], _trial_stress(scenario), 1.0)
     if noise:
@@ -130,22 +134,6 @@ def _violence(snapshot: Snapshot) -> float:
     if "pore_pressure" in snapshot:
         return float(snapshot["pore_pressure"].max())
     return float(np.abs(snapshot["solid_velocity"]).max())
-
-
-def _undecided_energy(scenario: Scenario, snapshot: Snapshot) -> float:
-    """Energy [J/m] that the law of the skeleton may hold beyond what is recorded of it: it is no potential.
-
-    Shear stress s stores V s² / 4 G if the shear is undone at the volume V, and less by 1 + p / K if the volume goes
-    first. The record holds the lesser; what was there at the start may have been the greater.
-    """
-    material = scenario.flow.material
-    xx, yy, zz, xy = snapshot["effective_stress"].T
-    mean = (xx + yy + zz) / 3.0
-    squares = (xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * xy**2
-    shear = material.young_modulus_Pa / (2.0 * (1.0 + material.poisson_ratio))
-    bulk = material.young_modulus_Pa / (3.0 * (1.0 - 2.0 * material.poisson_ratio))
-    pressure = np.maximum(-mean, 0.0)
-    return float(np.sum(snapshot["volume"] * squares / (4.0 * shear) * pressure / (bulk + pressure)))
 
 
 def _energy_error(columns: dict[str, Array], undecided: float) -> float:
@@ -192,9 +180,9 @@ def _widen(extremes: dict[str, float], scenario: Scenario, snapshot: Snapshot) -
         "porosity_low": -float(porosity.min()),
         "porosity_high": float(porosity.max()),
     }
-    found["yield_excess"], found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
-    if not scenario.flow.material.plasticity:
-        del found["yield_excess"]
+    excess, found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
+    if excess is not None:
+        found["yield_excess"] = excess
     for name, value in found.items():
         extremes[name] = float(np.maximum(extremes[name], value))  # which keeps NaN
 
@@ -218,21 +206,16 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
     return float(depth.max() / scenario.numerics.spacing_m)
 
 
-def _yield_excess(scenario: Scenario, stress: Array) -> tuple[float, float]:
-    """Greatest distance outside the yield surface and greatest principal stress [Pa]."""
+def _yield_excess(scenario: Scenario, stress: Array) -> tuple[float | None, float]:
+    """Greatest distance outside of what the law allows, None where it allows all, and greatest stress [Pa]."""
     material = scenario.flow.material
+    law = LAWS.named(material.law)
     xx, yy, zz, xy = stress.T
     mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
-    first, last = principal[2], principal[0]
-    sine, cosine = (
-        math.sin(math.radians(material.friction_angle_deg)),
-        math.cos(math.radians(material.friction_angle_deg)),
-    )
-    cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
-    apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
-    excess = np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
-    return float(np.maximum(excess.max(), 0.0)), float(max(np.abs(principal).max(), material.cohesion_Pa))
+    principal = np.abs([mean + radius, mean - radius, zz])
+    excess, strength = law.yield_excess(material, stress), law.strength(material)
+    greatest = float(max(principal.max(), strength if math.isfinite(strength) else 0.0))
+    return None if excess is None else float(np.maximum(excess.max(), 0.0)), greatest
 
 
 def _trial_stress(scenario: Scenario) -> float:

@@ -9,7 +9,8 @@ import warp as wp
 
 from ..effects import Effects
 from ..simulator.bodies.kernels import make_body_functions, make_place
-from ..simulator.schemes.scheme import all_functions
+from ..simulator.laws.law import all_functions as law_functions
+from ..simulator.schemes.scheme import all_functions as scheme_functions
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
@@ -38,7 +39,8 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
     tools = SimpleNamespace(**make_elementary(types).__dict__, **shapes.__dict__)
-    types.scheme = SimpleNamespace(**all_functions(effects.scheme, types, tools))
+    types.scheme = SimpleNamespace(**scheme_functions(effects.scheme, types, tools))
+    types.law = SimpleNamespace(**law_functions(effects.skeleton, types, tools))
     bodies = make_body_functions(types) if effects.bodies else None
     transfer = make_transfer(types, shapes, pore, bodies, module)
     constitutive = make_constitutive(types, shapes, pore, bodies, module)

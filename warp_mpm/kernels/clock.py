@@ -16,7 +16,6 @@ from .layout import (
     LARGEST_TIME_STEP,
     LEFT_LIQUID_MASS,
     LEFT_SOLID_MASS,
-    LIMIT_DRAG,
     LIMIT_OUTPUT,
     LIMIT_WAVE,
     SMALLEST_TIME_STEP,
@@ -39,13 +38,13 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
 
     @wp.func
     def choose_step(parameters: Parameters, clock: wp.array(dtype=wp.float64), counters: wp.array(dtype=wp.int32)):
-        """The wave and drag limits, shortened so that the steps to the target are equal."""
+        """The limits of waves, drag and the law, shortened so that the steps to the target are equal."""
         speed = wp.sqrt(clock[wp.static(SPEED_MAX)])
         wave = wp.float64(parameters.spacing) / (parameters.wave_speed + speed)
         limit = wp.static(LIMIT_WAVE)
         if parameters.largest_stable_step < wave:
             wave = parameters.largest_stable_step
-            limit = wp.static(LIMIT_DRAG)
+            limit = parameters.largest_stable_step_counter
         largest = parameters.courant_number * wave
         remaining = clock[wp.static(TARGET)] - clock[wp.static(TIME)]
         count = wp.ceil(remaining / largest - wp.float64(1.0e-9))

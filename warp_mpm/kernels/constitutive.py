@@ -20,64 +20,9 @@ from .layout import (
     TIME_STEP,
     VOIDS_CLOSED,
 )
-from .mohr_coulomb import make_return_mapping
 
 WORST = 0.6
 """Crowding beyond which more makes no difference: drops that land on each other must not be thrown apart."""
-
-
-def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
-    """Build the functions `trial_stress`, the elastic part of the constitutive law, and `volume_ratio`."""
-    F = types.scalar
-    V4 = types.V4
-    Parameters = types.Parameters
-
-    @wp.func
-    def volume_ratio(strain: F):
-        """exp(strain), the ratio of the volumes, as a quotient that is positive for every strain."""
-        even = F(12.0) + strain * strain
-        return (even + F(6.0) * strain) / (even - F(6.0) * strain)
-
-    @wp.func
-    def trial_stress(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
-        """Jaumann rate of the Kirchhoff stress, Eq. (A3), for an elastic step.
-
-        `gradient` is (dvx/dx, dvx/dy, dvy/dx, dvy/dy) [1/s]; `volume_strain` the increment that the skeleton bears [-],
-        which replaces the trace. Returns the stress and the deviatoric strain increment [-]. The rotation is the exact
-        one of the spin over the step (half-angle formula), so that it leaves invariants alone.
-        """
-        half = F(0.5)
-        third = volume_strain / F(3.0)
-        mean = half * volume_strain
-        stretch = half * time_step * (gradient[0] - gradient[3])
-        xx = mean + stretch
-        yy = mean - stretch
-        xy = half * time_step * (gradient[1] + gradient[2])
-        tangent = F(0.25) * time_step * (gradient[2] - gradient[1])
-        scale = F(1.0) / (F(1.0) + tangent * tangent)
-        c = (F(1.0) - tangent * tangent) * scale
-        s = F(2.0) * tangent * scale
-        cosine = c * c - s * s
-        sine = F(2.0) * c * s
-        centre = half * (stress[0] + stress[1])
-        difference = half * (stress[0] - stress[1])
-        turned_difference = difference * cosine - sine * stress[3]
-        turned_shear = sine * difference + cosine * stress[3]
-        # The rate integrated over the step, as for the volume: a strain and its reverse leave nothing behind.
-        keep = F(1.0) / volume_ratio(volume_strain)
-        over_step = F(12.0) / (F(12.0) + F(6.0) * volume_strain + volume_strain * volume_strain)
-        lame = parameters.lame * volume_strain * over_step
-        double = F(2.0) * parameters.shear_modulus * over_step
-        trial = V4(
-            keep * (centre + turned_difference) + lame + double * xx,
-            keep * (centre - turned_difference) + lame + double * yy,
-            keep * stress[2] + lame,
-            keep * turned_shear + double * xy,
-        )
-        squares = (xx - third) * (xx - third) + (yy - third) * (yy - third) + third * third + F(2.0) * xy * xy
-        return trial, wp.sqrt(F(wp.static(2.0 / 3.0)) * squares)
-
-    return SimpleNamespace(trial_stress=trial_stress, volume_ratio=volume_ratio)
 
 
 def make_constitutive(
@@ -107,7 +52,11 @@ def make_constitutive(
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     displacement = types.scheme.displacement
-    PLASTICITY = effects.plasticity
+    law = types.law
+    trial, back, extra, law_leave, volume_ratio = law.trial, law.back, law.extra, law.leave, law.volume_ratio
+    OPENS = effects.skeleton.opens
+    EXTRA_STRESS = effects.skeleton.extra_stress
+    AT_ONCE = effects.skeleton.vectorised
     BODIES = effects.bodies
     Bodies = types.Bodies
     set_back = bodies_of.set_back if BODIES else None
@@ -119,13 +68,8 @@ def make_constitutive(
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
-    SOLID_GAP = effects.smoothing_grid and effects.plasticity
+    SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
-
-    elasticity = make_elasticity(types)
-    trial_stress = elasticity.trial_stress
-    volume_ratio = elasticity.volume_ratio
-    return_mapping = make_return_mapping(types) if PLASTICITY else None
 
     @wp.func
     def room(filling: F) -> F:
@@ -144,6 +88,7 @@ def make_constitutive(
             points.surrounded[p] = 0
         if OWN_DIVERGENCE:
             points.liquid_divergence[p] = F(0.0)
+        law_leave(points, p)
         reference = points.reference_volume[p]
         v = points.velocity[p]
         solid = parameters.solid_density * reference
@@ -234,6 +179,29 @@ def make_constitutive(
                     write(points.solid_gap, p, largest)
                     wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
+    @wp.func
+    def settle(
+        points: Points,
+        p: wp.int32,
+        stress: V4,
+        gradient: V4,
+        volume: F,
+        gap: F,
+        time_step: F,
+        parameters: Parameters,
+    ):
+        """From the trial stress to what the law allows, and what the skeleton opens by."""
+        allowed, opening = back(points, p, stress, gradient, volume, time_step, parameters)
+        after = volume
+        if OPENS:
+            after *= F(1.0) - opening
+            # As a strain, -ln(1 - opening), so that the reverse strain closes the gap.
+            write(points.solid_gap, p, gap + opening / (F(1.0) - F(0.5) * opening))
+        if EXTRA_STRESS:
+            write(points.extra_stress, p, extra(points, p, allowed, gradient, time_step, parameters))
+        write(points.stress, p, allowed)
+        write(points.volume, p, after)
+
     @wp.kernel(module=module)
     def update(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
         """Strains, effective stress and pore pressure at the end of the step, from the rates at the point.
@@ -279,13 +247,13 @@ def make_constitutive(
         volume_strain = divergence * time_step
         borne = volume_strain
         gap = F(0.0)
-        if PLASTICITY:
+        if OPENS:
             # A skeleton that has opened bears nothing until the gap has closed.
             gap = read(points.solid_gap, p)
             closed = smaller(gap, larger(-borne, F(0.0)))
             borne += closed
             gap -= closed
-        stress, deviatoric = trial_stress(read(points.stress, p), gradient, borne, time_step, parameters)
+        stress, deviatoric = trial(points, p, read(points.stress, p), gradient, borne, time_step, parameters)
         write(points.deviatoric_strain, p, read(points.deviatoric_strain, p) + deviatoric)
         volume *= volume_ratio(borne)
         if LIQUID:
@@ -305,13 +273,13 @@ def make_constitutive(
                 filtered = wp.where(strain < F(0.0), smaller(strain + correction, F(0.0)), strain)
                 strain = wp.where(read(points.surrounded, p) == 1, filtered, strain)
             write(points.liquid_strain, p, strain)
-        if PLASTICITY:
-            stress, opening = return_mapping(stress, parameters)
-            volume *= F(1.0) - opening
-            # As a strain, -ln(1 - opening), so that the reverse strain closes the gap.
-            write(points.solid_gap, p, gap + opening / (F(1.0) - F(0.5) * opening))
-        write(points.stress, p, stress)
-        write(points.volume, p, volume)
+        if AT_ONCE:
+            settle(points, p, stress, gradient, volume, gap, time_step, parameters)
+        else:
+            write(points.stress, p, stress)
+            write(points.volume, p, volume)
+            if OPENS:
+                write(points.solid_gap, p, gap)
 
     @wp.kernel(module=module)
     def bound(
@@ -340,4 +308,26 @@ def make_constitutive(
                     write(points.liquid_strain, p, largest)
                     wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
-    return SimpleNamespace(advect=advect, update=update, bound=bound)
+    kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
+    if not AT_ONCE:
+
+        @wp.kernel(module=module)
+        def yielding(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+            """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
+            p = wp.tid()
+            gap = F(0.0)
+            if OPENS:
+                gap = read(points.solid_gap, p)
+            settle(
+                points,
+                p,
+                read(points.stress, p),
+                read(points.gradient, p),
+                read(points.volume, p),
+                gap,
+                F(clock[wp.static(TIME_STEP)]),
+                parameters,
+            )
+
+        kernels.yielding = yielding
+    return kernels

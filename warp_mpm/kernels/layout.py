@@ -61,7 +61,8 @@ BARRIER_UNCONVERGED = 6
 POINTS_LEFT = 7
 POINTS_PUSHED = 8
 """Times that a point deeper than half a cell in a solid was set back to that depth."""
-COUNTERS_SIZE = 9
+LIMIT_LAW = 9
+COUNTERS_SIZE = 10
 
 # Ledger sums, a float64 array written by the ledger kernel.
 LEDGER_KINETIC = 0
@@ -121,8 +122,10 @@ def layout(effects: Effects) -> SimpleNamespace:
         "gradient": array(dtype=V4),
         "inside": array(dtype=wp.int32),
     }
-    if effects.plasticity:
+    if effects.skeleton.opens:
         points["solid_gap"] = array(dtype=scalar)
+    if effects.skeleton.extra_stress:
+        points["extra_stress"] = array(dtype=V4)
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
     if effects.smoothing_grid:
@@ -137,7 +140,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.two_phase and not effects.volumetric_smoothing:
         points["liquid_divergence"] = array(dtype=scalar)
 
-    points |= {name: array(dtype=kind) for name, kind in effects.scheme.point_fields(types).items()}
+    for owner in (effects.skeleton, effects.scheme):
+        points |= {name: array(dtype=getattr(types, field.kind)) for name, field in owner.point_fields.items()}
 
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
@@ -161,7 +165,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         # The same with half a cell more in front of an inclined face, where points come to rest.
         grid["corner_space"] = array(dtype=scalar, ndim=2)
 
-    grid |= {name: array(dtype=kind, ndim=2) for name, kind in effects.scheme.grid_fields(types).items()}
+    grid |= {name: array(dtype=getattr(types, kind), ndim=2) for name, kind in effects.scheme.grid_fields.items()}
 
     parameters: dict[str, Any] = {
         "spacing": scalar,
@@ -181,30 +185,13 @@ def layout(effects: Effects) -> SimpleNamespace:
         "wave_speed": wp.float64,
         "courant_number": wp.float64,
         "largest_stable_step": wp.float64,
+        "largest_stable_step_counter": wp.int32,  # which of the counters LIMIT_... tells how often it ruled
     }
-    parameters |= dict.fromkeys(effects.scheme.constants, scalar)
+    parameters |= dict.fromkeys((*effects.skeleton.constants, *effects.scheme.constants), scalar)
     if effects.density_correction:
         parameters["density_correction"] = scalar  # share of the crowding undone per unit of shear strain
     if effects.bulk_viscosity:
         parameters["bulk_viscosity"] = scalar  # pressure per rate of compression [Pa s]
-    if effects.plasticity:
-        for name in (
-            "yield_plus",
-            "yield_minus",
-            "cohesion_term",
-            "tension_limit",
-            "plane_inverse",
-            "upper_own",
-            "upper_cross",
-            "upper_ratio",
-            "lower_own",
-            "lower_cross",
-            "lower_ratio",
-            "flow_up",
-            "flow_side",
-            "flow_down",
-        ):
-            parameters[name] = scalar
     if effects.liquid:
         for name in (
             "porosity",

@@ -34,6 +34,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     read, larger = elementary.read, elementary.larger
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
+    stored_in_skeleton = types.law.stored
     RELAXATION = effects.pressure_relaxation
     BODIES = effects.bodies
     MOVING = effects.moving
@@ -41,28 +42,9 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
 
     one = wp.constant(wp.float64(1.0))
 
-    # Both are of second order, and the difference of their terms loses all digits near 0: there, by their series.
-
-    @wp.func
-    def work_of_stretch(x: wp.float64):
-        """(1 + x) ln(1 + x) - x."""
-        result = wp.float64(0.0)
-        if wp.abs(x) < wp.float64(0.15):
-            # ln(1 + x) = 2 artanh t, of which the first seven terms leave 1e-15.
-            t = x / (wp.float64(2.0) + x)
-            q = t * t
-            tail = wp.float64(wp.static(1.0 / 11.0)) + q * wp.float64(wp.static(1.0 / 13.0))
-            tail = wp.float64(wp.static(1.0 / 7.0)) + q * (wp.float64(wp.static(1.0 / 9.0)) + q * tail)
-            tail = wp.float64(wp.static(1.0 / 3.0)) + q * (wp.float64(wp.static(1.0 / 5.0)) + q * tail)
-            result = (wp.float64(2.0) + x) * q * (one + (one + t) * t * tail)
-        else:
-            stretch = larger(one + x, wp.float64(1.0e-6))
-            result = stretch * wp.log(stretch) - x
-        return result
-
     @wp.func
     def work_of_exponential(x: wp.float64):
-        """exp(x) - 1 - x."""
+        """exp(x) - 1 - x, of second order: near 0 the difference loses all digits, so there by its series."""
         result = wp.float64(0.0)
         if wp.abs(x) < wp.float64(0.01):
             result = x * (wp.float64(wp.static(1.0 / 120.0)) + x * wp.float64(wp.static(1.0 / 720.0)))
@@ -70,20 +52,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
             result = (wp.float64(0.5) + result) * x * x
         else:
             result = wp.exp(x) - one - x
-        return result
-
-    @wp.func
-    def stored_in_skeleton(strain: wp.float64, volume: wp.float64, grains: wp.float64, modulus: wp.float64):
-        """Energy [J/m] of a mean stress, given as p / K. The rate of Eq. (A3) makes it p = K (V_0 / V - 1), so the work
-        done on the way there is V ((K + p) ln(1 + p / K) - p), and p^2 / 2 K per volume only while p is far below K.
-        Beyond closed voids the volume that works is that of the grains."""
-        result = volume * modulus * work_of_stretch(strain)
-        if volume < grains:
-            # At closure V_0 / V was less by the ratio of the volumes.
-            stretch = larger(one + strain, wp.float64(1.0e-6))
-            closed = stretch * volume / grains
-            result = grains * modulus * (closed * wp.log(closed) - closed + one)
-            result += grains * modulus * (stretch - closed - wp.log(stretch / closed))
         return result
 
     @wp.func
@@ -106,7 +74,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         kinetic_energy = wp.float64(0.0)
         gravitational_energy = wp.float64(0.0)
         elastic_energy = wp.float64(0.0)
-        distortion_energy = wp.float64(0.0)
         seepage = wp.float64(0.0)
         momentum_x = wp.float64(0.0)
         momentum_y = wp.float64(0.0)
@@ -114,7 +81,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         pressure_max = wp.float64(0.0)
         pressure_mean = wp.float64(0.0)
         not_finite = wp.float64(0.0)
-        per_bulk_modulus = one / wp.float64(parameters.bulk_modulus)
         if LIQUID:
             if BODIES:
                 crest_end = parameters.crest_end
@@ -145,17 +111,9 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     liquid_mass += wp.float64(liquid)
                     seepage += wp.float64(liquid * wp.dot(parameters.gravity, V2(v[2] - v[0], v[3] - v[1])))
                 s = read(points.stress, p)
-                trace = s[0] + s[1] + s[2]
                 squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
-                deviatoric = squares - trace * trace * F(wp.static(1.0 / 3.0))
                 grains = parameters.grain_share * reference
-                strain = wp.float64(-trace * F(wp.static(1.0 / 3.0))) * per_bulk_modulus
-                # Shear stress s at the volume V was s V / V_0 before the volume changed, which does no work on it.
-                distortion_energy += wp.float64(volume * deviatoric) / larger(one + strain, wp.float64(1.0e-6))
-                # In double precision always: the work is a small difference of the terms.
-                elastic_energy += stored_in_skeleton(
-                    strain, wp.float64(volume), wp.float64(grains), wp.float64(parameters.bulk_modulus)
-                )
+                elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
                 # Not negative, any of them, so that what is not finite in one shows in the sum.
                 sound = squares + volume + kinetic
                 if LIQUID:
@@ -190,7 +148,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         wp.atomic_add(sums, wp.static(LEDGER_SOLID_MASS), solid_mass)
         wp.atomic_add(sums, wp.static(LEDGER_KINETIC), kinetic_energy)
         wp.atomic_add(sums, wp.static(LEDGER_GRAVITATIONAL), gravitational_energy)
-        elastic_energy += distortion_energy / (wp.float64(4.0) * wp.float64(parameters.shear_modulus))
         wp.atomic_add(sums, wp.static(LEDGER_ELASTIC), elastic_energy)
         wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_X), momentum_x)
         wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_Y), momentum_y)

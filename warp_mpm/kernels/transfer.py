@@ -53,6 +53,7 @@ def make_transfer(
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
+    EXTRA_STRESS = effects.skeleton.extra_stress
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
     near = bodies_of.near if LIQUID_ALONE else None
     displaced = bodies_of.displaced if LIQUID_ALONE else None
@@ -159,6 +160,8 @@ def make_transfer(
         per_cell = parameters.inverse_spacing * force_share(time_step)
         push = volume * per_cell
         liquid_force *= per_cell
+        if EXTRA_STRESS:
+            stress += read(points.extra_stress, p)
         xx = (solid_pressure - stress[0]) * push
         yy = (solid_pressure - stress[1]) * push
         xy = -stress[3] * push

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from warp_mpm.effect_rules import without_liquid
+from warp_mpm.effect_rules import with_law, without_liquid
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
 from warp_mpm.performance.table import Progress, Table
 from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
@@ -63,12 +63,12 @@ def _ladder(full: Scenario) -> list[tuple[str, Scenario]]:
     barrier = full.resolved()["barrier"]
     fixed = barrier | {"motion": {"kind": "fixed"}, "friction": 0.0}
     nothing: dict[str, Any] = {
-        "barrier": None, "flow.material.plasticity": False, "numerics.volumetric_smoothing": False,
-        "numerics.density_correction": 0.0, "numerics.bulk_viscosity": 0.0,
+        "barrier": None, "numerics.volumetric_smoothing": False, "numerics.density_correction": 0.0,
+        "numerics.bulk_viscosity": 0.0,
     }  # fmt: skip
     steps: list[tuple[str, dict[str, Any]]] = [
         ("dry, elastic, smooth ground", {}),
-        ("plasticity", {"flow.material.plasticity": True}),
+        ("plasticity", {"flow": dry.resolved()["flow"]}),
         ("volumetric smoothing", {"numerics.volumetric_smoothing": True}),
         ("density correction", {"numerics.density_correction": full.numerics.density_correction or 1.0}),
         ("bulk viscosity", {"numerics.bulk_viscosity": full.numerics.bulk_viscosity or 0.2}),
@@ -76,7 +76,7 @@ def _ladder(full: Scenario) -> list[tuple[str, Scenario]]:
         ("barrier friction", {"barrier": fixed | {"friction": barrier["friction"]}}),
         ("sliding barrier", {"barrier": barrier}),
     ]
-    scenes, scene = [], dry.replaced(nothing)
+    scenes, scene = [], dry.replaced(nothing | with_law(dry, "elastic"))
     for name, changes in steps:
         scene = scene.replaced(changes)
         scenes.append((name, scene))

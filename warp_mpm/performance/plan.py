@@ -60,6 +60,8 @@ class Plan:
     """Largest stable step at the flow's initial speed [s], before the Courant number."""
     drag_step: float
     """Largest stable step of explicit drag [s]; infinite where drag does not limit it."""
+    law_step: float
+    """Largest stable step of the skeleton's law [s]; infinite where it does not limit it."""
     steps: int
     """Predicted number of time steps."""
     step_cost: float
@@ -80,7 +82,13 @@ class Plan:
     @property
     def limit(self) -> str:
         """Which limit sets the time step."""
-        return "wave" if self.wave_step <= self.drag_step else "drag"
+        steps = {"wave": self.wave_step, "drag": self.drag_step, "law": self.law_step}
+        return min(steps, key=lambda name: steps[name])
+
+    @property
+    def largest_step(self) -> float:
+        """Largest stable step [s] at the flow's initial speed, before the Courant number."""
+        return min(self.wave_step, self.drag_step, self.law_step)
 
 
 @dataclass(frozen=True)
@@ -124,6 +132,7 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
         blocks_in_use=blocks,
         wave_step=scenario.numerics.spacing_m / (step_limits(scenario).wave_speed + scenario.flow.speed),
         drag_step=step_limits(scenario).drag_step,
+        law_step=step_limits(scenario).law_step,
         steps=predicted_steps(scenario, ahead),
         step_cost=step_cost,
         recording_time=_recording_time(scenario, simulation, clock),
@@ -226,7 +235,7 @@ def _steps(scenario: Scenario, ahead: list[Ahead]) -> list[tuple[float, Ahead]]:
         while place + 1 < len(ahead) and ahead[place + 1].begin <= number * interval:
             place += 1
         wave = numerics.spacing_m / (limits.wave_speed + ahead[place].speed)
-        largest = numerics.courant_number * min(wave, limits.drag_step)
+        largest = numerics.courant_number * min(wave, limits.largest_step)
         found.append((math.ceil(interval / largest - 1e-9) * min(stretch, intervals - number), ahead[place]))
     return found
 

@@ -46,7 +46,7 @@ class Stepper:
         """Greatest simulated time that was reached [s]."""
         limits, numerics = step_limits(scenario), scenario.numerics
         wave = numerics.spacing_m / (limits.wave_speed + scenario.flow.speed)
-        self._step = numerics.courant_number * min(wave, limits.drag_step)
+        self._step = numerics.courant_number * min(wave, limits.largest_step)
         self._per_step = self._cost(2)[0] / 2.0
 
     def _begun(self) -> Simulation:

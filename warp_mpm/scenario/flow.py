@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Annotated, Literal, Self
+from functools import cache
+from typing import Annotated, Any, Literal, Self, Union
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity
+from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
+from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 
 class FrontAndTail(Model):
@@ -59,7 +62,7 @@ class FlowPolygon(Model):
 
 
 class Skeleton(Model):
-    """Solid grains and their skeleton: linear elastic, non-associative Mohr–Coulomb."""
+    """Solid grains and their skeleton, elastic up to what its law allows; the law's own fields stand beside these."""
 
     grain_density_kg_per_m3: Density
     """Density of the grains themselves. The dry (partial) density is (1 - n) times this."""
@@ -69,25 +72,19 @@ class Skeleton(Model):
     """Young's modulus E' of the drained skeleton."""
     poisson_ratio: Annotated[float, Field(gt=-1.0, lt=0.5)]
     """Poisson's ratio ν of the drained skeleton."""
-    friction_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)]
-    """Internal friction angle φ'."""
-    cohesion_Pa: NonNegative = 0.0
-    """Effective cohesion c'."""
-    dilatancy_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 0.0
-    """Dilatancy angle ψ, at most the friction angle."""
-    tension_cutoff_Pa: NonNegative = 0.0
-    """Largest tensile principal effective stress."""
-    plasticity: bool = True
-    """False leaves the skeleton elastic."""
+    law: str = DEFAULT
+    """How the skeleton answers a strain."""
 
-    @model_validator(mode="after")
-    def _flow_rule(self) -> Self:
-        if self.dilatancy_angle_deg > self.friction_angle_deg:
+    @model_validator(mode="before")
+    @classmethod
+    def _no_plasticity(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "plasticity" in data:
+            instead = '"law": "elastic"' if data["plasticity"] is False else 'nothing, or "law": "mohr_coulomb"'
             raise ValueError(
-                f"dilatancy_angle_deg = {self.dilatancy_angle_deg:g} must not exceed "
-                f"friction_angle_deg = {self.friction_angle_deg:g}"
+                f"plasticity = {json.dumps(data['plasticity'], default=str)} is no longer a field of a scenario; "
+                f"write {instead} instead"
             )
-        return self
+        return data
 
     @property
     def solid_partial_density(self) -> float:
@@ -103,6 +100,22 @@ class Skeleton(Model):
     def density(self) -> float:
         """Density of the whole, ρ_m [kg/m³]."""
         return self.solid_partial_density + self.liquid_partial_density
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + ν)) [Pa]."""
+        return self.young_modulus_Pa / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def lame_modulus(self) -> float:
+        """λ = E ν / ((1 + ν)(1 - 2ν)) [Pa]."""
+        nu = self.poisson_ratio
+        return self.young_modulus_Pa * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K = λ + 2 G / 3 [Pa]."""
+        return self.lame_modulus + 2.0 / 3.0 * self.shear_modulus
 
     @property
     def oedometric_modulus(self) -> float:
@@ -167,9 +180,16 @@ class _FlowBase(Model):
     initial_stress: Literal["geostatic", "zero"] = "geostatic"
     """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    """K0, horizontal over vertical effective stress at t = 0; null: Jaky's 1 - sin φ'."""
+    """K0, horizontal over vertical effective stress at t = 0; null: that of the law, as Jaky's 1 - sin φ'."""
 
     material: Skeleton
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_law(cls, data: Any) -> Any:
+        if isinstance(data, dict) and isinstance(data.get("material"), dict):
+            return data | {"material": {"law": DEFAULT} | data["material"]}
+        return data
 
     @property
     def polygon(self) -> geometry.Polygon:
@@ -178,10 +198,10 @@ class _FlowBase(Model):
 
     @property
     def lateral_stress_ratio(self) -> float:
-        """K0 [-], given or 1 - sin φ'."""
+        """K0 [-], given or that of the material's law."""
         if self.lateral_stress_coefficient is not None:
             return self.lateral_stress_coefficient
-        return 1.0 - math.sin(math.radians(self.material.friction_angle_deg))
+        return LAWS.named(self.material.law).lateral_stress_ratio(self.material)
 
     @property
     def volume(self) -> float:
@@ -226,3 +246,36 @@ class DryFlow(_FlowBase):
 
 
 Flow = TwoPhaseFlow | UndrainedFlow | DryFlow
+
+_MATERIALS: dict[type[_FlowBase], type[Skeleton]] = {
+    TwoPhaseFlow: TwoPhaseMaterial,
+    UndrainedFlow: UndrainedMaterial,
+    DryFlow: Skeleton,
+}
+
+
+def offer_laws() -> None:
+    """Make each flow take materials of every law, with that law's fields."""
+    for flow, material in _MATERIALS.items():
+        kinds: Any = Union[tuple(_with_law(material, law) for law in LAWS)]  # noqa: UP007 - of as many as there are
+        set_fields(flow, {"material": (Annotated[kinds, Field(discriminator="law")], ...)})
+
+
+@cache
+def _with_law(material: type[Skeleton], law: Law) -> type[Skeleton]:
+    """The material with a law's fields, under a name of its own in this module, so that it can be pickled."""
+    default = DEFAULT if law.name == DEFAULT else ...
+    name = material.__name__ + "".join(part.capitalize() for part in law.name.split("_"))
+    tag: Any = (Literal[law.name], Field(default, description=f"How the skeleton answers a strain: {law.title}."))
+    made: Any = create_model(
+        name,
+        __base__=(material,) if law.Settings is Model else (law.Settings, material),
+        __module__=__name__,
+        __doc__=f"{material.__doc__} Law: {law.title}.",
+        law=tag,
+    )
+    globals()[name] = made
+    return made
+
+
+offer_laws()

@@ -11,9 +11,9 @@ from pydantic import Field, ValidationError, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
-from warp_mpm.scenario.fields import Model
-from warp_mpm.scenario.flow import Flow
-from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output
+from warp_mpm.scenario.fields import Model, set_fields
+from warp_mpm.scenario.flow import Flow, offer_laws
+from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
 from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
 
 
@@ -90,6 +90,13 @@ class Scenario(Model):
         if found:
             raise ValueError("\n".join(found))
         return self
+
+
+def offer_anew() -> None:
+    """Make scenarios take the laws and transfer schemes that there are now."""
+    offer_laws()
+    offer_schemes()
+    set_fields(Scenario, {"numerics": (Numerics, Numerics())})
 
 
 def json_schema() -> str:

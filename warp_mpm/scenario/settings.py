@@ -82,7 +82,8 @@ def offer_schemes() -> None:
     """Make `Numerics` take the name of every scheme, and the fields of each."""
     titles = "; ".join(f"{scheme.name}: {scheme.title}" for scheme in SCHEMES)
     names = Annotated[
-        Literal[*SCHEMES.names], Field(description=f"Velocity transfer between points and grid. {titles}.")
+        Literal[*SCHEMES.names],  # type: ignore[valid-type]
+        Field(description=f"Velocity transfer between points and grid. {titles}."),
     ]
     fields = {"transfer": (names, Numerics.model_fields["transfer"].default)}
     for scheme in SCHEMES:

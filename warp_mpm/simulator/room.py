@@ -73,12 +73,15 @@ def content(idea: Any) -> str:
 
     Of the compiled code, which is there even where the source is not, as for a class of a notebook.
     """
-    digest, seen = hashlib.sha256(), set()
+    digest = hashlib.sha256()
+    seen: set[Any] = set()
 
     def take(value: Any) -> None:
         value = getattr(value, "func", value)  # of a Warp function
-        if isinstance(value, property | staticmethod | classmethod):
-            value = getattr(value, "fget", None) or value.__func__
+        if isinstance(value, property):
+            value = value.fget
+        elif isinstance(value, staticmethod | classmethod):
+            value = value.__func__
         if isinstance(value, FunctionType):
             if value in seen:
                 return
@@ -103,14 +106,14 @@ def content(idea: Any) -> str:
 
     def take_code(code: CodeType) -> set[str]:
         """Take in a function's code; return the names of others that it uses."""
-        digest.update(code.co_code)
+        digest.update(code.co_code + repr(code.co_varnames).encode())
         names = set(code.co_names)
         for constant in code.co_consts:
             if isinstance(constant, CodeType):
                 names |= take_code(constant)
             else:
                 digest.update(repr(constant).encode())
-        return names | {name for name in code.co_varnames if digest.update(name.encode())}
+        return names
 
     take(type(idea))
     take(dict(sorted(getattr(idea, "__dict__", {}).items())))

@@ -42,17 +42,15 @@ def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
     ]
     for body in bodies:
         step += _contact(body, passes(body, bodies))
-    step.append(
-        Launch(
-            "gather", "points", ("points", *grid), "velocities and their gradients to the points, strains to corners"
-        )
-    )
+    step.append(Launch("gather", "points", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
+    takes = ("points", "parameters", "clock")
     step += [
         Launch("advect", "points", (*points, "counters", "limiters", "left"), "moves the points"),
-        Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
-        Launch("bound", "points", ("points", "parameters", "clock", "limiters"), "limits that few points come to"),
+        Launch("update", "points", takes, "strain, effective stress and pore pressure"),
+        *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
+        Launch("bound", "points", (*takes, "limiters"), "limits that few points come to"),
         Launch(
             "tick",
             "one",

@@ -41,6 +41,11 @@ def point_arrays(
     }
     if effects.liquid:
         given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
+    for owner in (effects.skeleton, effects.scheme):
+        for name, field in owner.point_fields.items():
+            start = field.start(scenario, initial) if callable(field.start) else field.start
+            shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
+            given[name] = np.ascontiguousarray(np.broadcast_to(start, shape))
     return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
 
 

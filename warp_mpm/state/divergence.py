@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import Effects
 from ..kernels import layout as at
 from ..scenario import Numerics
 
@@ -24,13 +25,26 @@ class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not 
     """The run left the range of sense; the message says when and what to try."""
 
 
+def diverging(effects: Effects) -> dict[str, str]:
+    """Arrays of the material points in which a divergence shows, those of the law and of the scheme last."""
+    own = {**effects.skeleton.point_fields, **effects.scheme.point_fields}
+    return NAMES | {name: field.meaning for name, field in own.items() if field.meaning}
+
+
 def what_diverged(
-    arrays: Mapping[str, NDArray[np.floating]], *, time: float, steps: int, barrier_velocity: float, numerics: Numerics
+    arrays: Mapping[str, NDArray[np.floating]],
+    names: Mapping[str, str],
+    *,
+    time: float,
+    steps: int,
+    barrier_velocity: float,
+    numerics: Numerics,
 ) -> str:
     """When, which quantity, where, and what to try.
 
     Args:
-        arrays: those of the material points in `NAMES` that the scene has, N rows each.
+        arrays: those of the material points in `names` that the scene has, N rows each.
+        names: what they are called in a sentence, from `diverging`.
         time: simulated time [s].
         steps: time steps so far.
         barrier_velocity: [m/s].
@@ -41,7 +55,7 @@ def what_diverged(
         bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
         if bad.any():
             known = arrays["position"][bad & np.isfinite(arrays["position"]).all(axis=1)]
-            found = f"{NAMES[name]} of {bad.sum()} of {len(values)} material points is not a finite number"
+            found = f"{names[name]} of {bad.sum()} of {len(values)} material points is not a finite number"
             place = known[0] if len(known) else None
             break
     if not found:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -10,12 +9,11 @@ from typing import Any
 from ..effects import Effects
 from ..grid import GridLayout
 from ..kernels import layout as at
-from ..kernels.mohr_coulomb import yield_constants
 from ..scenario import STANDARD_GRAVITY, Scenario, Trapezoid
 from ..simulator.bodies import Body
 from ..simulator.bodies.of_scene import BARRIER
 from ..simulator.bodies.outline import ENDLESS
-from ..time_step import StepLimits
+from ..time_step import StepLimits, moving_density
 
 
 def kernel_parameters(
@@ -66,42 +64,25 @@ def _grid_and_clock(
         "gravity": scenario.gravity.vector,
         "wave_speed": limits.wave_speed,
         "courant_number": numerics.courant_number,
-        "largest_stable_step": limits.drag_step,
+        "largest_stable_step": limits.largest_step,
+        "largest_stable_step_counter": at.LIMIT_LAW if limits.law_step < limits.drag_step else at.LIMIT_DRAG,
     } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed)
 
 
 def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
     material, numerics = scenario.flow.material, scenario.numerics
-    young, nu = material.young_modulus_Pa, material.poisson_ratio
-    shear = young / (2.0 * (1.0 + nu))
-    lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     values: dict[str, Any] = {
-        "solid_density": _moving_density(scenario, effects),
-        "lame": lame,
-        "shear_modulus": shear,
-        "bulk_modulus": lame + 2.0 / 3.0 * shear,
+        "solid_density": moving_density(scenario),
+        "lame": material.lame_modulus,
+        "shear_modulus": material.shear_modulus,
+        "bulk_modulus": material.bulk_modulus,
         "grain_share": 1.0 - material.porosity,
-    }
-    if effects.plasticity:
-        values |= yield_constants(
-            lame=lame,
-            shear_modulus=shear,
-            friction_angle=math.radians(material.friction_angle_deg),
-            dilatancy_angle=math.radians(material.dilatancy_angle_deg),
-            cohesion=material.cohesion_Pa,
-            tension_cutoff=material.tension_cutoff_Pa,
-        )
+    } | effects.skeleton.numbers(material)
     if effects.density_correction:
         values["density_correction"] = numerics.density_correction
     if effects.bulk_viscosity:
         values["bulk_viscosity"] = numerics.bulk_viscosity * material.density * limits.sound_speed * numerics.spacing_m
     return values
-
-
-def _moving_density(scenario: Scenario, effects: Effects) -> float:
-    """Mass per volume of the whole that moves with the solid [kg/m3]."""
-    material = scenario.flow.material
-    return material.density if effects.formulation == "undrained" else material.solid_partial_density
 
 
 def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
@@ -110,7 +91,7 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
     values = {
         "porosity": material.porosity,
         "true_liquid_density": material.liquid_density_kg_per_m3,
-        "filling_ratio": material.liquid_density_kg_per_m3 / _moving_density(scenario, effects),
+        "filling_ratio": material.liquid_density_kg_per_m3 / moving_density(scenario),
         "liquid_bulk_modulus": material.liquid_bulk_modulus_Pa,
         "cavitation_pressure": material.cavitation_pressure_Pa,
         "relaxation_rate": numerics.pressure_relaxation * (limits.sound_speed / numerics.spacing_m),

@@ -125,7 +125,7 @@ def _impact(formulation: str, cells: int, speed: float, times: Array, **soil: fl
         velocity=(0.0, -speed),
         gravity=0.0,
         stress="zero",
-        soil={"plasticity": False, **soil},
+        soil={"law": "elastic", **soil},
     )
     simulation = Simulation(scene)
     height = layers(simulation.points()["position"], 2 * cells)[:, 1]
@@ -193,7 +193,7 @@ def dry_column(quick: bool) -> Outcome:
     # Gravity of 1 m/s2 comes on at once: the column swings about its settled state with the period 4 H / c.
     cells, gravity, period = 20 if quick else 40, 1.0, 4.0 / wave_speed
     simulation = Simulation(
-        column("dry", cells=cells, end_time=3.0 * period, gravity=gravity, stress="zero", soil={"plasticity": False})
+        column("dry", cells=cells, end_time=3.0 * period, gravity=gravity, stress="zero", soil={"law": "elastic"})
     )
     times = np.linspace(0.0, 2.6 * period, 521)
     top = [0.0]
@@ -330,7 +330,7 @@ def terzaghi(quick: bool) -> Outcome:
         "two_phase",
         cells=cells,
         end_time=factors[-1] / coefficient,
-        soil={"plasticity": False, "hydraulic_conductivity_m_per_s": conductivity},
+        soil={"law": "elastic", "hydraulic_conductivity_m_per_s": conductivity},
     )
     simulation = Simulation(scene)
     points = simulation.points()

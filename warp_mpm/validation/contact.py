@@ -13,7 +13,7 @@ from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, 
 from warp_mpm.validation.scenes import box, sampled, scene
 
 G = 9.81
-STIFF = {"young_modulus_Pa": 1e9, "poisson_ratio": 0.0, "plasticity": False}
+STIFF = {"young_modulus_Pa": 1e9, "poisson_ratio": 0.0, "law": "elastic"}
 
 
 # -- block on an incline -----------------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def _bystander(mass: float, friction: float, end_time: float) -> Simulation:
             "dry",
             end_time=end_time,
             lateral=1.0,
-            soil={"plasticity": False},
+            soil={"law": "elastic"},
             barrier={
                 "shape": {"kind": "trapezoid", "base_width_m": 11.0, "crest_width_m": 4.0, "height_m": 6.0},
                 "motion": {"kind": "sliding", "mass_kg_per_m": mass, "base_friction": friction},

@@ -8,9 +8,10 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.effects import Effects
-from warp_mpm.kernels.constitutive import make_elasticity
+from warp_mpm.kernels.elementary import make_elementary
 from warp_mpm.kernels.layout import layout
-from warp_mpm.kernels.mohr_coulomb import make_return_mapping, yield_constants
+from warp_mpm.simulator.laws.elastic import make_elasticity
+from warp_mpm.simulator.laws.mohr_coulomb import make_return_mapping, yield_constants
 from warp_mpm.validation.case import Array
 
 
@@ -21,7 +22,7 @@ def _kernels() -> SimpleNamespace:
     module = wp.get_module("warp_mpm.validation.elements")
     wp.set_module_options({"enable_backward": False}, module=module)
     trial_stress = make_elasticity(types).trial_stress
-    return_mapping = make_return_mapping(types)
+    return_mapping = make_return_mapping(types, make_elementary(types))
     V4, Parameters = types.V4, types.Parameters
 
     @wp.kernel(module=module)

@@ -156,7 +156,7 @@ INFLUENCES: Mapping[str, dict[str, Any]] = {
     "no bulk viscosity": {"numerics__bulk_viscosity": 0.0},
     "9 points per cell": {"numerics__points_per_cell": 9},
     "liquid as stiff as real water, K_L = 2.2 GPa": {"flow__material__liquid_bulk_modulus_Pa": 2.2e9},
-    "elastic flow": {"flow__material__plasticity": False},
+    "elastic flow": {"law": "elastic"},
 }
 """What is changed in case 1, sliding and fixed, to see what moves the peak."""
 

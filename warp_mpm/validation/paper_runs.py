@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from analytic.force_record import cumulative_impulse, moving_mean
+from warp_mpm.effect_rules import with_law
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
@@ -96,10 +97,11 @@ class PaperRun:
         return self.at("pore_pressure_max", 1.0)
 
 
-def paper_scene(name: str, spacing: float, **changes: Any) -> Scenario:
-    """One of the paper's scenes at a spacing [m], with fields changed: `barrier__friction=0`."""
+def paper_scene(name: str, spacing: float, law: str | None = None, **changes: Any) -> Scenario:
+    """One of the paper's scenes at a spacing [m], with another law or fields changed: `barrier__friction=0`."""
     fields = {path.replace("__", "."): value for path, value in changes.items()}
-    return Scenario.load(SCENES / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
+    scenario = Scenario.load(SCENES / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
+    return scenario if law is None else scenario.replaced(with_law(scenario, law))
 
 
 @contextmanager

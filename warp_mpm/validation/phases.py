@@ -65,7 +65,7 @@ def settling(quick: bool) -> Outcome:
     cells = 20 if quick else 40
     solid_speed = CONDUCTIVITY * (1.0 - POROSITY) * (GRAIN_DENSITY / LIQUID_DENSITY - 1.0)
     liquid_speed = solid_speed * (1.0 - POROSITY) / POROSITY
-    soil = {"plasticity": False, "liquid_bulk_modulus_Pa": REAL_WATER}
+    soil = {"law": "elastic", "liquid_bulk_modulus_Pa": REAL_WATER}
     simulation = Simulation(column("two_phase", cells=cells, end_time=0.3, soil=soil))
     points = simulation.points()
     density = SOLID + LIQUID

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,6 +16,9 @@ GRAIN_DENSITY, LIQUID_DENSITY, POROSITY = 2600.0, 1000.0, 0.5
 YOUNG_MODULUS, POISSON_RATIO, FRICTION_ANGLE = 2e6, 0.25, 20.0
 CONDUCTIVITY, LIQUID_BULK_MODULUS = 1e-4, 3e7
 """The paper's Table 1."""
+
+JAKY = 1.0 - math.sin(math.radians(FRICTION_ANGLE))
+"""Lateral stress at rest, of elastic scenes too, so that they begin as the others do."""
 
 INVISCID = {"young_modulus_Pa": 1e4, "friction_angle_deg": 0.0}
 """A skeleton without strength: with its voids full of liquid the undrained mixture flows like a perfect fluid."""
@@ -33,6 +37,8 @@ def material(formulation: str, **changes: Any) -> dict[str, Any]:
         fields |= {"liquid_density_kg_per_m3": LIQUID_DENSITY, "liquid_bulk_modulus_Pa": LIQUID_BULK_MODULUS}
     if formulation == "two_phase":
         fields |= {"hydraulic_conductivity_m_per_s": CONDUCTIVITY}
+    if changes.get("law") == "elastic":
+        del fields["friction_angle_deg"]
     return fields | changes
 
 
@@ -54,6 +60,7 @@ def scene(
     **numerics: Any,
 ) -> Scenario:
     """A scene from a polygon and a few figures; `soil` replaces fields of the material, `ground` is its friction."""
+    elastic = (soil or {}).get("law") == "elastic"
     return Scenario.model_validate(
         {
             "title": title,
@@ -63,7 +70,7 @@ def scene(
                 "shape": {"kind": "polygon", "vertices_m": vertices},
                 "velocity_m_per_s": velocity,
                 "initial_stress": stress,
-                "lateral_stress_coefficient": lateral,
+                "lateral_stress_coefficient": JAKY if lateral is None and elastic else lateral,
                 "material": material(formulation, **(soil or {})),
             },
             "barrier": barrier,

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
+from ..point_field import PointField
 from .scheme import Scheme
 
 
@@ -14,10 +15,8 @@ class Apic(Scheme):
 
     name = "apic"
     title = "affine particle-in-cell (Jiang et al. 2015)"
+    point_fields = {"affine_x": PointField("V"), "affine_y": PointField("V")}  # noqa: RUF012
     keeps_affine_field = True
-
-    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
-        return {"affine_x": types.V, "affine_y": types.V}
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from warp_mpm.scenario.fields import Model
 
+from ..point_field import PointField
 from .scheme import Scheme
 
 
@@ -21,13 +22,9 @@ class Flip(Scheme):
     name = "flip"
     title = "flip (Sulsky et al. 1995, the paper's)"
     settings = Settings
+    point_fields = {"advection": PointField("V2")}  # noqa: RUF012
+    grid_fields = {"force": "V", "increment": "V"}  # noqa: RUF012
     constants = ("pic_rate",)
-
-    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
-        return {"advection": types.V2}
-
-    def grid_fields(self, types: SimpleNamespace) -> dict[str, Any]:
-        return {"force": types.V, "increment": types.V}
 
     def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
         return {"pic_rate": numerics.pic_share * (sound_speed / numerics.spacing_m)}

@@ -1,9 +1,12 @@
 """What a transfer scheme is: everything that scatter, nodes and gather must be told of it, in one object."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from warp_mpm.scenario.fields import Model
+
+from ..point_field import PointField
 
 if TYPE_CHECKING:
     from ..step import Launch
@@ -23,19 +26,15 @@ class Scheme:
     """What it is, in a clause, with its source."""
     settings: ClassVar[type[Model]] = Model
     """Its fields in `numerics`, each with a default, limits and a docstring."""
+    point_fields: ClassVar[Mapping[str, PointField]] = {}
+    """What a point stores for it."""
+    grid_fields: ClassVar[Mapping[str, str]] = {}
+    """What a node stores for it: kinds as of a `PointField`."""
     constants: ClassVar[tuple[str, ...]] = ()
     """Numbers that its functions read from the parameters."""
     keeps_affine_field: ClassVar[bool] = False
     """Whether a point alone on its nodes keeps its rate of strain from step to step, which makes it more stable
     (`time_step.lone_point_courant_number`)."""
-
-    def point_fields(self, types: SimpleNamespace) -> dict[str, Any]:
-        """What a point stores for it: Warp types by name. All begin at 0."""
-        return {}
-
-    def grid_fields(self, types: SimpleNamespace) -> dict[str, Any]:
-        """What a node stores for it: Warp types by name."""
-        return {}
 
     def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
         """Values of `constants`.

@@ -1,15 +1,110 @@
 """Mohr-Coulomb plasticity with tension cut-off: return mapping in principal stress, sigma_zz included."""
 
+# ruff: noqa: N815 - a unit at the end of a field's name keeps its own spelling (Pa)
+
 import math
 from types import SimpleNamespace
-from typing import Any
+from typing import Annotated, Any, Self
 
-import warp as wp
+import numpy as np
+from pydantic import Field, model_validator
 
-from .elementary import make_elementary
+from warp_mpm.scenario.fields import Model, NonNegative
+
+from .law import Array, Law
 
 
-def make_return_mapping(types: SimpleNamespace) -> Any:
+class Settings(Model):
+    friction_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)]
+    """Internal friction angle φ'."""
+    cohesion_Pa: NonNegative = 0.0
+    """Effective cohesion c'."""
+    dilatancy_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 0.0
+    """Dilatancy angle ψ, at most the friction angle."""
+    tension_cutoff_Pa: NonNegative = 0.0
+    """Largest tensile principal effective stress."""
+
+    @model_validator(mode="after")
+    def _flow_rule(self) -> Self:
+        if self.dilatancy_angle_deg > self.friction_angle_deg:
+            raise ValueError(
+                f"dilatancy_angle_deg = {self.dilatancy_angle_deg:g} must not exceed "
+                f"friction_angle_deg = {self.friction_angle_deg:g}"
+            )
+        return self
+
+
+class MohrCoulomb(Law):
+    """Linear elastic, non-associative Mohr–Coulomb with a tension cut-off, beyond which the skeleton opens."""
+
+    name = "mohr_coulomb"
+    title = "non-associative Mohr–Coulomb with a tension cut-off (the paper's)"
+    Settings = Settings
+    opens = True
+    constants = (
+        "yield_plus",
+        "yield_minus",
+        "cohesion_term",
+        "tension_limit",
+        "plane_inverse",
+        "upper_own",
+        "upper_cross",
+        "upper_ratio",
+        "lower_own",
+        "lower_cross",
+        "lower_ratio",
+        "flow_up",
+        "flow_side",
+        "flow_down",
+    )
+
+    def numbers(self, material: Any) -> dict[str, float]:
+        return yield_constants(
+            lame=material.lame_modulus,
+            shear_modulus=material.shear_modulus,
+            friction_angle=math.radians(material.friction_angle_deg),
+            dilatancy_angle=math.radians(material.dilatancy_angle_deg),
+            cohesion=material.cohesion_Pa,
+            tension_cutoff=material.tension_cutoff_Pa,
+        )
+
+    def bears_tension(self, material: Any) -> bool:
+        return material.tension_cutoff_Pa > 0.0 and material.cohesion_Pa > 0.0
+
+    def lateral_stress_ratio(self, material: Any) -> float:
+        """Jaky's 1 - sin φ'."""
+        return 1.0 - math.sin(math.radians(material.friction_angle_deg))
+
+    def strength(self, material: Any) -> float:
+        return material.cohesion_Pa
+
+    def yield_excess(self, material: Any, stress: Array) -> Array:
+        xx, yy, zz, xy = stress.T
+        mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
+        first, last = principal[2], principal[0]
+        angle = math.radians(material.friction_angle_deg)
+        sine, cosine = math.sin(angle), math.cos(angle)
+        cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
+        apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
+        return np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
+
+    def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+        import warp as wp
+
+        F, V4, Points, Parameters = types.scalar, types.V4, types.Points, types.Parameters
+        return_mapping = make_return_mapping(types, tools)
+
+        @wp.func
+        def back(
+            points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters
+        ):
+            return return_mapping(stress, parameters)
+
+        return {"back": back}
+
+
+def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
     """Build the Warp function that maps a trial stress back onto the yield surface.
 
     Perfect plasticity with linear elasticity, so every region of the surface has a closed form (Clausen et al. 2007,
@@ -26,12 +121,13 @@ def make_return_mapping(types: SimpleNamespace) -> Any:
     over the volume after it [-].
     Where most points yield, branches cost more than arithmetic: the cone is free of them.
     """
+    import warp as wp
+
     F = types.scalar
     V3 = types.V3
     V4 = types.V4
     Parameters = types.Parameters
-    elementary = make_elementary(types)
-    larger, smaller = elementary.larger, elementary.smaller
+    larger, smaller = tools.larger, tools.smaller
 
     @wp.func
     def cone(s: V3, y: Parameters) -> V3:
