@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from analytic.command_line import BAD_INPUT, complain, refusals
+from analytic.command_line import BAD_INPUT, add_version, complain, refusals
 from warp_mpm.commands import register
 from warp_mpm.commands.check import check
 from warp_mpm.commands.options import ScenarioCommandLine, with_options
@@ -30,6 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+add_version(app)
 
 
 def main() -> None:

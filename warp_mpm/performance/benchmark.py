@@ -13,6 +13,7 @@ from warp_mpm.performance.table import Progress, Table
 from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.scenario import Scenario
+from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulation import Simulation
 
 SHORT: dict[str, Any] = {"numerics.spacing_m": 0.125, "output.end_time_s": 0.5}
@@ -211,7 +212,7 @@ def _larger_steps(base: Scenario, device: str, progress: Progress) -> Table:
     return Table("steps", "Larger and smaller steps", columns, rows)
 
 
-CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"
+CASE = SCENARIOS / "case_1.json"
 
 
 def machine() -> dict[str, str]:

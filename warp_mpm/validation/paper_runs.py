@@ -15,10 +15,9 @@ from analytic.force_record import cumulative_impulse, moving_mean
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
+from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulation import Simulation
 from warp_mpm.validation.case import Array
-
-SCENES = Path(__file__).parents[2] / "scenarios"
 
 TITLES = {
     "case_1": "case 1",
@@ -99,7 +98,7 @@ class PaperRun:
 def paper_scene(name: str, spacing: float, **changes: Any) -> Scenario:
     """One of the paper's scenes at a spacing [m], with fields changed: `barrier__friction=0`."""
     fields = {path.replace("__", "."): value for path, value in changes.items()}
-    return Scenario.load(SCENES / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
+    return Scenario.load(SCENARIOS / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
 
 
 @contextmanager
