@@ -39,7 +39,7 @@ def main() -> None:
 
 
 @app.command(
-    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib --spacing 0.25 --until 2; "
+    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib_coarse --spacing 0.25 --until 2; "
     "several at once: python -m warp_mpm run scenarios/case_*.json --jobs 4"
 )
 def run(
