@@ -20,7 +20,8 @@ import warp_mpm.cli
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("index", "api")
-PAGES = ("../README", "index", "tutorial", "api", *(f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md"))))
+HOW_TO = (f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md")))
+PAGES = ("../README", "index", "tutorial", "api", *HOW_TO)
 
 BLOCK = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
