@@ -108,3 +108,15 @@ def test_a_page_makes_the_runs_that_it_reads(page):
     for block in PYTHON.findall(text):
         for folder in re.findall(r'Results\.open\("([^"]+)"\)', block):
             assert folder in there, folder
+
+
+TIMED = re.compile(
+    r"\d (?:s|µs|minutes) (?:on|of) one core|wall time|wall \[s\]|takes? [\d.]+ (?:s|ms|µs)\b|\| [\d.]+ µs \|"
+)
+MACHINE = re.compile(r"AMD EPYC|Intel|Apple M\d|GeForce|A100|H\d00")
+
+
+def test_times_on_a_page_name_their_machine():
+    timed = [page for page in PAGES if TIMED.search((ROOT / page).read_text(encoding="utf-8"))]
+    assert {"README.md", "docs/validation.md", "docs/performance.md", "docs/cosimulation.md"} <= set(timed)
+    assert [page for page in timed if not MACHINE.search((ROOT / page).read_text(encoding="utf-8"))] == []

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import platform
 import time
-from pathlib import Path
 from typing import Any
 
 from warp_mpm.effect_rules import without_liquid
+from warp_mpm.performance.machine import processor
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
 from warp_mpm.performance.table import Progress, Table
 from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
@@ -219,13 +219,7 @@ def machine() -> dict[str, str]:
     """What the figures were taken on."""
     import warp
 
-    name = platform.processor() or platform.machine()
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    return {"processor": name, "warp": warp.__version__, "python": platform.python_version(), "taken": _today()}
+    return {"processor": processor(), "warp": warp.__version__, "python": platform.python_version(), "taken": _today()}
 
 
 def _today() -> str:
