@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 import typer
 from typer.core import TyperGroup
@@ -34,6 +34,26 @@ def refusals() -> Iterator[None]:
 def complain(sentence: str) -> None:
     """Print a sentence to standard error, red on a terminal."""
     typer.secho(sentence, err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+
+
+def _tell_versions(asked: bool) -> None:
+    if asked:
+        from analytic.version import versions
+
+        typer.echo(versions())
+        raise typer.Exit
+
+
+def add_version(app: typer.Typer) -> None:
+    """Give a command line the option --version."""
+
+    @app.callback()
+    def options(
+        version: Annotated[
+            bool,
+            typer.Option("--version", callback=_tell_versions, is_eager=True, help="Tell the version, and Warp's."),
+        ] = False,
+    ) -> None: ...
 
 
 class CommandLine(TyperGroup):

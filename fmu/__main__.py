@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from analytic.command_line import add_version
 from warp_mpm.commands.options import ScenarioCommandLine, with_options
+from warp_mpm.shipped import where_to_get
 
 if TYPE_CHECKING:
     from fmu.cross_check import CrossCheck
@@ -27,6 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+add_version(app)
 
 
 def main() -> None:
@@ -68,7 +71,7 @@ def build(
             built = c_unit.build_c_unit(out, platforms=tuple(platform) if platform else None)
             _tell(built, f"for {', '.join(c_unit.platforms_of(built))}")
             if platform is None and not c_unit.has_cross_compiler():
-                typer.echo(f"{built.name} for other platforms {c_unit.NEEDS_CROSS_COMPILER}.", err=True)
+                typer.echo(c_unit.needs_cross_compiler(f"{built.name} for other platforms"), err=True)
         for unit in archive.PYTHON_UNITS:
             if unit.name in chosen:
                 _tell(archive.build_python_unit(unit, out, scenario=scenario, simulate_reference=True))
@@ -109,7 +112,7 @@ def check(
 
     for file in files or ():
         if not file.is_file():
-            _refuse(f"{file} is not there.")
+            _refuse(f"{file} is not there.{where_to_get(file)}")
         if file.suffix not in (".fmu", ".json"):
             _refuse(f"{file} has the suffix {file.suffix!r}, it must be .fmu or .json.")
     content: list[object] = []

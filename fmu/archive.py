@@ -20,13 +20,14 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from analytic.version import PROJECT, project_version
 from fmu import documentation, reference
 from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface
 from fmu.units.slave import UnitError
 from fmu.units.worker_process import RECORD
+from warp_mpm.shipped import SCENARIOS
 
-PROJECT = "warp-mpm-impact"
 _HERE = Path(__file__).parent
 _UNITS = _HERE / "units"
 _ROOT = _HERE.parent
@@ -82,23 +83,13 @@ class PythonUnit:
         return importlib.import_module(f"fmu.units.{self.module}").INTERFACE
 
 
-DEFAULT_SCENARIO = _ROOT / "scenarios" / "set_iib.json"
+DEFAULT_SCENARIO = SCENARIOS / "set_iib.json"
 
 PYTHON_UNITS = (
     PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", ("sliding.py",), needs_impact=True),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
     PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
 )
-
-
-def project_version() -> str:
-    """Version of the project, from its installation or, in a bare checkout, from ``pyproject.toml``."""
-    try:
-        return metadata.version(PROJECT)
-    except metadata.PackageNotFoundError:
-        import tomllib
-
-        return tomllib.loads((_ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 
 def build_python_unit(

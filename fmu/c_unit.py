@@ -20,11 +20,13 @@ from xml.etree.ElementTree import indent, tostring
 
 import fmpy
 
+from analytic.version import project_version
 from fmu import documentation
-from fmu.archive import BuildError, project_version, write_archive
+from fmu.archive import BuildError, write_archive
 from fmu.units.barrier_sliding import INTERFACE as PYTHON_INTERFACE
 from fmu.units.interface import Interface, Variable
 from fmu.units.model_description import guid, model_description
+from warp_mpm.extras import missing
 
 INTERFACE = replace(PYTHON_INTERFACE, name="BarrierSlidingC")
 
@@ -34,8 +36,6 @@ PLATFORMS = {
     "darwin64": (".dylib", ("x86_64-macos", "aarch64-macos")),
 }
 """FMI platform: file name extension of its binary, and the targets of the cross-compiler that go into it."""
-
-NEEDS_CROSS_COMPILER = "needs the package ziglang: pip install '.[fmu]'"
 
 _SOURCES = Path(__file__).parent / "c"
 _FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -94,6 +94,11 @@ def build_c_unit(folder: Path, *, platforms: tuple[str, ...] | None = None, vers
 def has_cross_compiler() -> bool:
     """Whether the package ``ziglang`` is installed."""
     return importlib.util.find_spec("ziglang") is not None
+
+
+def needs_cross_compiler(what: str) -> str:
+    """The sentence for what cannot be built without ``ziglang``."""
+    return missing(what, "the package ziglang", "fmu")
 
 
 def platforms_of(unit: Path) -> list[str]:
@@ -168,7 +173,7 @@ def _compile(stage: Path, name: str, target: str) -> bytes:
     elif PLATFORMS[host_platform()][1][0] == target and (compiler := shutil.which("cc") or shutil.which("gcc")):
         command = [compiler, "-s"]
     else:
-        raise BuildError(f"Building for {target} {NEEDS_CROSS_COMPILER}.")
+        raise BuildError(needs_cross_compiler(f"Building for {target}"))
     if "windows" not in target:
         command += ["-fPIC", "-fvisibility=hidden"]
     libraries = [] if "windows" in target else ["-lm"]

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.whole_file import whole_file
+from warp_mpm.extras import missing
 from warp_mpm.fields import Field, colour_limits, field_named
 from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, in_lines, shown, window
 from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading
@@ -135,9 +136,7 @@ def _write_mp4(pictures: Iterator[np.ndarray], target: Path, rate: float) -> Non
     try:
         import imageio_ffmpeg
     except ImportError:
-        raise PlotError(
-            "mp4 needs imageio-ffmpeg (pip install 'warp-mpm-impact[animate]'); a gif needs nothing more."
-        ) from None
+        raise PlotError(missing("mp4", "imageio-ffmpeg (a gif needs nothing more)", "animate")) from None
     first = next(pictures)
     writer = imageio_ffmpeg.write_frames(
         str(target),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from analytic.command_line import BAD_INPUT, complain, refusals
+from analytic.command_line import BAD_INPUT, add_version, complain, refusals
 from warp_mpm.commands import register
 from warp_mpm.commands.check import check
 from warp_mpm.commands.options import ScenarioCommandLine, with_options
@@ -30,6 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+add_version(app)
 
 
 def main() -> None:
@@ -38,7 +39,7 @@ def main() -> None:
 
 
 @app.command(
-    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib --spacing 0.25 --until 2; "
+    epilog="Example: python -m warp_mpm run scenarios/set_iib.json --out runs/set_iib_coarse --spacing 0.25 --until 2; "
     "several at once: python -m warp_mpm run scenarios/case_*.json --jobs 4"
 )
 def run(

@@ -11,6 +11,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,6 +20,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.extras import missing
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.quantities import POINT_FIELDS, TIME_SERIES
 from warp_mpm.scenario import Scenario
@@ -194,12 +196,13 @@ class Results:
 
     def frame(self) -> Any:
         """The time series as a pandas DataFrame, indexed by time [s]; `frame.attrs["units"]` has each column's unit and
-        `frame.attrs["meanings"]` what it is. Needs pandas.
+        `frame.attrs["meanings"]` what it is. Needs pandas, of the extra `xarray`.
 
         Raises:
+            ModuleNotFoundError: pandas is not installed; the sentence says what to install.
             ResultsError: the file is missing or damaged.
         """
-        import pandas as pd
+        pd = _optional("Results.frame()", "pandas")
 
         series = self.time_series
         known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
@@ -211,15 +214,16 @@ class Results:
 
     def dataset(self) -> Any:
         """The snapshots as an xarray Dataset over (time, point), with `units` and `long_name` on every variable; the
-        time series of the barrier's displacement goes with them. Needs xarray.
+        time series of the barrier's displacement goes with them. Needs xarray, of the extra of that name.
 
         Where points have left the domain, the rows of later times are filled up with NaN, and a row is then no longer
         the same point at all times.
 
         Raises:
+            ModuleNotFoundError: xarray is not installed; the sentence says what to install.
             ResultsError: the file is missing or damaged.
         """
-        import xarray as xr
+        xr = _optional("Results.dataset()", "xarray")
 
         frames = list(self.snapshots)
         most = max((len(frame.position) for frame in frames), default=0)
@@ -267,6 +271,18 @@ class Results:
         if not isinstance(content, dict):
             raise ResultsError(f"{self.path / name} does not hold a group of fields.")
         return content
+
+
+def _optional(what: str, package: str) -> Any:
+    """An optional package as a module.
+
+    Raises:
+        ModuleNotFoundError: it is not installed; the sentence says what to install.
+    """
+    try:
+        return import_module(package)
+    except ModuleNotFoundError:
+        raise ModuleNotFoundError(missing(what, package, "xarray"), name=package) from None
 
 
 def read_time_series(path: Path) -> dict[str, Array]:

@@ -13,6 +13,8 @@ from typing import Any
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel, ValidationError
 
+from warp_mpm.shipped import where_to_get
+
 LARGEST_FILE = 16 * 1024 * 1024
 """Bytes; a scenario is a page of text, so anything larger is a mistake."""
 
@@ -53,6 +55,8 @@ def read_json(path: Path) -> Any:
                 [f"The file is larger than {LARGEST_FILE // 1024**2} MB; this is no scenario."], str(path)
             )
         text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise ScenarioError([f"Cannot read the scenario: {error.strerror}.{where_to_get(path)}"], str(path)) from None
     except OSError as error:
         raise ScenarioError([f"Cannot read the scenario: {error.strerror or error}."], str(path)) from None
     except UnicodeDecodeError:

@@ -5,6 +5,9 @@ Exit codes: 0 done, 2 the input cannot be used (one sentence says why, on the st
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import typer
 
 from analytic.cli.calibrate import calibrate
@@ -13,7 +16,7 @@ from analytic.cli.design import design
 from analytic.cli.field import field
 from analytic.cli.predict import predict
 from analytic.cli.sweep import sweep
-from analytic.command_line import CommandLine
+from analytic.command_line import CommandLine, add_version
 
 app = typer.Typer(
     cls=CommandLine,
@@ -23,6 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
+add_version(app)
 FLOW = (
     "--flow-mass 81000 --barrier-mass 81000 --flow-length 15 --flow-height 3 --speed 10 --base-friction 0.29 "
     "--lambda 0.41 --tau 0.35"
@@ -39,5 +43,5 @@ app.add_typer(sweep, name="sweep")
 
 
 def main() -> None:
-    """Entry point of `python -m analytic`."""
-    app(prog_name="python -m analytic")
+    """Entry point of `python -m analytic` and of the installed command `warp-mpm-analytic`."""
+    app(prog_name="warp-mpm-analytic" if Path(sys.argv[0]).name.startswith("warp-mpm") else "python -m analytic")

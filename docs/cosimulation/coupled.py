@@ -4,14 +4,17 @@
     python docs/cosimulation/coupled.py
 
 DebrisFlow gives the force on the barrier, BarrierSliding moves the barrier under it and gives its velocity back, and
-GroundAnchor holds the barrier by a force that follows from its displacement. Run with --help for the options.
+GroundAnchor holds the barrier by a force that follows from its displacement. The barrier's mass, base friction and
+slope, and the end of the run, are those of the scenario in DebrisFlow.fmu. Run with --help for the options.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import shutil
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +23,9 @@ from typing import NoReturn
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+
+from analytic.impact import friction_deceleration
+from warp_mpm import Scenario
 
 UNITS = ("DebrisFlow", "BarrierSliding", "GroundAnchor")
 
@@ -74,26 +80,56 @@ class Row:
     """Since the first step began [s]."""
 
 
+def scenario_in(archives: Path) -> Scenario:
+    """The scenario that DebrisFlow simulates."""
+    with zipfile.ZipFile(archives / "DebrisFlow.fmu") as archive:
+        return Scenario.model_validate(json.loads(archive.read("resources/scenario.json")))
+
+
+def barrier_parameters(scenario: Scenario, barrier_mass: float | None = None) -> dict[str, float]:
+    """What BarrierSliding must be given to be the scenario's barrier, or one of another mass [kg/m].
+
+    Raises:
+        ValueError: the scenario's barrier is none that BarrierSliding could be.
+    """
+    motion = scenario.barrier.motion if scenario.barrier is not None else None
+    if scenario.barrier is None or motion is None or motion.kind != "sliding":
+        kind = f"barrier.motion.kind is {motion.kind!r}" if motion is not None else "there is no barrier"
+        raise ValueError(f"{scenario.title}: {kind}, it must be 'sliding' for a barrier that another unit moves.")
+    friction, gravity, slope = motion.base_friction_coefficient, scenario.gravity, scenario.gravity.tilt_deg
+    if slope and friction <= abs(math.tan(math.radians(slope))):
+        raise ValueError(
+            f"{scenario.title}: the barrier's base friction is {friction:.3g}, it must be greater than the slope's "
+            f"tangent, {abs(math.tan(math.radians(slope))):.3g}: BarrierSliding knows no barrier that slides by itself."
+        )
+    effective = gravity.acceleration_m_per_s2
+    if slope:  # The unit has no slope; less gravity on its base does the same.
+        effective = friction_deceleration(effective, friction, slope) / friction
+    mass = barrier_mass if barrier_mass is not None else scenario.barrier.mass
+    return {"barrier_mass": mass, "base_friction": friction, "gravity": effective}
+
+
 def run_coupled(
     archives: Path,
     *,
     step: float,
-    end: float = 6.0,
+    end: float | None = None,
     spacing: float = 0.0,
     scheme: str = "gauss-seidel",
-    barrier_mass: float = 90000.0,
+    barrier_mass: float | None = None,
     anchor: dict[str, float] | None = None,
 ) -> list[Row]:
-    """Run the three units to ``end`` [s] with a communication step [s].
+    """Run the three units to ``end`` [s] with a communication step [s]; what is not given is the scenario's.
 
     ``gauss-seidel`` steps the flow first and passes its mean force over the step to the barrier's step over the same
     time, so that the barrier receives just the momentum that the flow lost. ``jacobi`` steps all units with what the
     others gave at the last communication point, as tools do that step them side by side.
     """
+    scenario = scenario_in(archives)
+    parameters = barrier_parameters(scenario, barrier_mass)
+    end = scenario.output.end_time_s if end is None else end
     flow = Unit(archives / "DebrisFlow.fmu", barrier_motion=2, spacing=spacing)
-    barrier = Unit(
-        archives / "BarrierSliding.fmu", impact_force_source=2, barrier_mass=barrier_mass, base_friction=0.29
-    )
+    barrier = Unit(archives / "BarrierSliding.fmu", impact_force_source=2, **parameters)
     tie = Unit(archives / "GroundAnchor.fmu", **(anchor or {"slack": 1e3}))
     rows = [Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
     started = perf_counter()
@@ -162,7 +198,7 @@ def main() -> None:
     parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--archives", type=Path, default=Path("build/fmu"), help="folder with the built units")
     parser.add_argument("--step", type=number(above=0.0), default=0.005, help="communication step [s]")
-    parser.add_argument("--end", type=number(above=0.0), default=6.0, help="end time [s]")
+    parser.add_argument("--end", type=number(above=0.0), help="end time [s]; without it the scenario's")
     parser.add_argument(
         "--spacing", type=number(least=0.0), default=0.0, help="grid spacing [m]; 0 takes the scenario's"
     )
@@ -171,13 +207,19 @@ def main() -> None:
     parser.add_argument("--stiffness", type=number(least=0.0), help=stiffness)
     parser.add_argument("--yield-force", type=number(above=0.0), default=150e3, help="yield force of the anchor [N/m]")
     given = parser.parse_args()
-    if given.step > given.end:
-        parser.error(f"--step: {given.step:g} is not allowed; it must be at most --end, {given.end:g}")
     if not all((given.archives / f"{name}.fmu").is_file() for name in UNITS):
         parser.error(f"--archives: {given.archives} must hold {', '.join(UNITS)}; python -m fmu build makes them")
+    scenario = scenario_in(given.archives)
+    end = scenario.output.end_time_s if given.end is None else given.end
+    if given.step > end:
+        parser.error(f"--step: {given.step:g} is not allowed; it must be at most --end, {end:g}")
+    try:
+        barrier_parameters(scenario)
+    except ValueError as error:
+        parser.error(str(error).removesuffix("."))
     anchor = {"stiffness": given.stiffness, "yield_force": given.yield_force} if given.stiffness else None
     rows = run_coupled(
-        given.archives, step=given.step, end=given.end, spacing=given.spacing, scheme=given.scheme, anchor=anchor
+        given.archives, step=given.step, end=end, spacing=given.spacing, scheme=given.scheme, anchor=anchor
     )
     print(f"{'time [s]':>9} {'force [kN/m]':>13} {'v2 [m/s]':>9} {'dx [m]':>8} {'anchor [kN/m]':>14}")
     for row in rows[:: max(len(rows) // 24, 1)]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from coupled import run_coupled
+from coupled import run_coupled, scenario_in
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -131,6 +131,8 @@ def main() -> None:
     parser.add_argument("--spacing", type=float, default=0.4, help="grid spacing [m]")
     parser.add_argument("--figure", type=Path, default=Path("build/step_study.png"), help="picture to write")
     given = parser.parse_args()
+    if scenario_in(given.archives) != Scenario.load(SCENARIO):
+        parser.error(f"--archives: DebrisFlow.fmu in {given.archives} must hold Set IIb")
     outcomes, references = study(given.archives, given.spacing)
     for mass, (displacement, wall) in references.items():
         print(f"\n{BARRIERS[mass][0]}, {BARRIERS[mass][1]:g} s: monolithic {displacement:.3f} m in {wall:.2f} s")

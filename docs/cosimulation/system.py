@@ -3,17 +3,20 @@
     python -m fmu build
     python docs/cosimulation/system.py --out build/system.ssp --run
 
-Any tool that reads SSP takes the archive, for instance libcosim or OMSimulator; they apply the parameters in it. fmpy's
-own runner leaves them to its caller, so they are read here and passed on.
+The barrier's mass, base friction and slope, and the end of the run, are those of the scenario in DebrisFlow.fmu, as in
+coupled.py. Any tool that reads SSP takes the archive, for instance libcosim or OMSimulator; they apply the parameters
+in it. fmpy's own runner leaves them to its caller, so they are read here and passed on.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
+from coupled import barrier_parameters, scenario_in
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import Parameter, ParameterSet
 
@@ -27,9 +30,12 @@ NAMESPACES = {
 
 def write_system(archives: Path, path: Path, *, spacing: float | None = None) -> Path:
     """Pack the structure and the units into ``path``; ``spacing`` [m] replaces that of the scenario."""
+    scenario = scenario_in(archives)
+    values = barrier_parameters(scenario) | ({} if spacing is None else {"spacing": spacing})
     structure = STRUCTURE.read_text(encoding="utf-8")
-    if spacing is not None:
-        structure = structure.replace('<ssv:Real value="0.0" unit="m"/>', f'<ssv:Real value="{spacing}" unit="m"/>')
+    for name, value in values.items():
+        structure = re.sub(rf'(name="{name}"><ssv:Real value=)"[^"]*"', rf'\g<1>"{value!r}"', structure)
+    structure = re.sub(r'stopTime="[^"]*"', f'stopTime="{scenario.output.end_time_s!r}"', structure)
     path.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SystemStructure.ssd", structure)
@@ -57,12 +63,18 @@ def main() -> None:
     parser.add_argument("--spacing", type=float, help="grid spacing [m], instead of the scenario's")
     parser.add_argument("--run", action="store_true", help="run it with fmpy")
     parser.add_argument("--step", type=float, default=0.01, help="communication step [s]")
-    parser.add_argument("--end", type=float, default=6.0, help="end time [s]")
+    parser.add_argument("--end", type=float, help="end time [s]; without it the scenario's")
     given = parser.parse_args()
-    path = write_system(given.archives, given.out, spacing=given.spacing)
+    if not all((given.archives / f"{name}.fmu").is_file() for name in UNITS):
+        parser.error(f"--archives: {given.archives} must hold {', '.join(UNITS)}; python -m fmu build makes them")
+    try:
+        path = write_system(given.archives, given.out, spacing=given.spacing)
+    except ValueError as error:
+        parser.error(str(error))
     print(f"System: {path}")
     if given.run:
-        result = simulate_ssp(str(path), stop_time=given.end, step_size=given.step, parameter_set=parameters(path))
+        end = scenario_in(given.archives).output.end_time_s if given.end is None else given.end
+        result = simulate_ssp(str(path), stop_time=end, step_size=given.step, parameter_set=parameters(path))
         last = result[-1]
         print(f"Final displacement: {last['barrier.barrier_displacement']:.3f} m")
         print(f"Anchor used to: {last['anchor.utilisation']:.0%}")

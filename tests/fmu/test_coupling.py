@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import math
+import shutil
 import subprocess
 import sys
 import textwrap
+import zipfile
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
+from fmu import archive
 from warp_mpm import Scenario, Simulation
 
 ROOT = Path(__file__).parents[2]
@@ -83,6 +89,69 @@ def test_coupling_error_falls_with_the_step(folder: Path) -> None:
         errors.append(abs(rows[-1].barrier_displacement / simulation.barrier_displacement - 1))
     assert errors[1] < 0.02
     assert errors[1] < errors[0] / 2.5  # first order: 5; chaos of the free surface takes its share
+
+
+OWN_SCENE = {
+    "numerics.spacing_m": 0.75,
+    "gravity.tilt_deg": 8.0,
+    "barrier.motion": {"kind": "sliding", "mass_kg_per_m": 150e3, "base_soil_friction_angle_deg": 30.0},
+    "output.end_time_s": 1.5,
+}
+
+
+@pytest.fixture(scope="module")
+def own(archives: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Scenario, Path]:
+    """A scene of one's own: another barrier, on a slope; and the folder of units that were built for it."""
+    folder = tmp_path_factory.mktemp("own")
+    scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(OWN_SCENE)
+    file = folder / "own.json"
+    file.write_text(json.dumps(scenario.resolved()))
+    (unit,) = [unit for unit in archive.PYTHON_UNITS if unit.name == "DebrisFlow"]
+    archive.build_python_unit(unit, folder, scenario=file)
+    for name in ("BarrierSliding", "GroundAnchor"):
+        shutil.copy(archives[name], folder)
+    return scenario, folder
+
+
+def test_the_coupled_barrier_is_that_of_the_scene(own: tuple[Scenario, Path]) -> None:
+    """Its mass, base friction and slope, and the end of the run: nothing of Set IIb, for which the script was made."""
+    scenario, folder = own
+    rows = coupled.run_coupled(folder, step=0.01)
+    simulation = Simulation(scenario)
+    for step in range(1, 151):
+        simulation.advance(until=step * 0.01)
+    assert rows[-1].time == pytest.approx(1.5)
+    assert simulation.barrier_displacement > 0.2
+    assert rows[-1].barrier_displacement == pytest.approx(simulation.barrier_displacement, rel=0.01)
+
+
+def test_the_packed_system_is_that_of_the_scene(own: tuple[Scenario, Path], tmp_path: Path) -> None:
+    _, folder = own
+    path = system.write_system(folder, tmp_path / "system.ssp", spacing=0.9)
+    values = {one.name: float(one.value) for one in system.parameters(path).parameters}
+    friction = 0.8 * math.tan(math.radians(30))
+    angle = math.radians(8)
+    assert values["barrier.barrier_mass"] == 150e3
+    assert values["barrier.base_friction"] == pytest.approx(friction)
+    assert values["barrier.gravity"] == pytest.approx(9.81 * (math.cos(angle) - math.sin(angle) / friction))
+    assert values["flow.spacing"] == 0.9
+    with zipfile.ZipFile(path) as packed:
+        assert 'stopTime="1.5"' in packed.read("SystemStructure.ssd").decode()
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"barrier.motion": {"kind": "fixed"}}, "barrier.motion.kind is 'fixed', it must be 'sliding'"),
+        ({"barrier": None}, "there is no barrier, it must be 'sliding'"),
+        ({"gravity.tilt_deg": 25.0}, "base friction is 0.462, it must be greater than the slope's tangent, 0.466"),
+    ],
+)
+def test_a_scene_without_a_barrier_that_slides_is_refused(
+    own: tuple[Scenario, Path], changes: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        coupled.barrier_parameters(own[0].replaced(changes))
 
 
 def test_ssp_archive_runs_with_every_master(folder: Path, tmp_path: Path) -> None:

@@ -242,12 +242,13 @@ def test_command_says_for_which_platforms_the_c_unit_is(
         assert done.stderr == ""
     else:
         assert done.stdout.endswith(f" kB  for {c_unit.host_platform()}\n")
-        assert "for other platforms needs the package ziglang: pip install '.[fmu]'" in done.stderr
+        assert 'for other platforms needs the package ziglang: pip install "ziglang>=' in done.stderr
 
 
 def test_command_leaves_nothing_where_a_compiler_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(c_unit, "has_cross_compiler", lambda: False)
     done = CliRunner().invoke(app, ["build", "--platform", "win64", "--out", str(tmp_path)])
     assert done.exit_code == 2
-    assert done.stderr == "Building for x86_64-windows-gnu needs the package ziglang: pip install '.[fmu]'.\n"
+    assert done.stderr.startswith('Building for x86_64-windows-gnu needs the package ziglang: pip install "ziglang>=')
+    assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())

@@ -1,20 +1,23 @@
 """`python -m warp_mpm hard-cases` as a user types it."""
 
 import json
+import shlex
 
 import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.cli import app
+from warp_mpm.commands import EXAMPLES, hard_cases
 
 
 def command(*arguments):
     return CliRunner().invoke(app, ["hard-cases", *map(str, arguments)])
 
 
-def test_cases_are_run_drawn_and_recorded(tmp_path):
+def test_the_helps_example_is_run_drawn_and_recorded(tmp_path):
     page = tmp_path / "robustness.md"
-    result = command("--quick", "--only", "one_point", "--only", "face_90", "--out", tmp_path / "out", "--page", page)
+    words = shlex.split(EXAMPLES[hard_cases].split("hard-cases ")[1])
+    result = command(*words, "--out", tmp_path / "out", "--page", page)
     assert result.exit_code == 0, result.output
     assert "2 of 2 cases are stable" in result.stdout
     figures = json.loads((tmp_path / "out" / "hard_cases.json").read_text())

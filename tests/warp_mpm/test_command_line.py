@@ -77,7 +77,7 @@ def test_there_is_much_in_brackets():
     assert found["analytic design"] > 10
     for command in ("warp_mpm plot", "warp_mpm report", "warp_mpm animate", "analytic calibrate", "analytic field"):
         assert found[command] > 0
-    assert "pip install 'warp-mpm-impact[animate]'" in answer(warp_mpm.cli.app, "animate", "--help").stdout
+    assert "pip install '.[animate]'" in answer(warp_mpm.cli.app, "animate", "--help").stdout
 
 
 @pytest.mark.parametrize("name", APPLICATIONS)

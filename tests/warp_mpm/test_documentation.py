@@ -1,13 +1,13 @@
 """What the documentation tells a reader to type is typed: every `bash` and `python` block of the pages, in order.
 
 Blocks marked `console` are for other machines (a cluster, a GPU) or take long; they are not typed. A `json` block with
-a title is saved under that name, as the page asks its reader to do. Pages that run many scenes are marked slow.
+a title is saved under that name, as the page asks its reader to do. Pages that run many scenes are marked slow; the
+pages share one folder, as they do on a reader's machine.
 """
 
 import json
 import os
 import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -20,7 +20,8 @@ import warp_mpm.cli
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("index", "api")
-PAGES = ("index", "tutorial", "api", *(f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md"))))
+HOW_TO = (f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md")))
+PAGES = ("../README", "index", "tutorial", "api", *HOW_TO)
 
 BLOCK = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -29,18 +30,20 @@ def blocks(page):
     return BLOCK.findall((ROOT / "docs" / f"{page}.md").read_text())
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """A folder as a reader has it: the scenarios at hand, the results in `runs`."""
-    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder as a reader has it: the scenarios at hand, the results of all pages in `runs`."""
+    folder = tmp_path_factory.mktemp("reader")
+    (folder / "scenarios").symlink_to(ROOT / "scenarios")
+    return folder
 
 
 @pytest.mark.parametrize(
     "page", [page if page in QUICK else pytest.param(page, marks=pytest.mark.slow) for page in PAGES]
 )
 def test_page_does_what_it_says(page, folder):
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"}
     for language, title, text in blocks(page):
         if title:
             (folder / title).write_text(text)
@@ -49,13 +52,14 @@ def test_page_does_what_it_says(page, folder):
             commands = [[sys.executable, "-c", text]]
         elif language == "bash":
             lines = text.replace("\\\n", " ").strip().split("\n")
+            lines = [line for line in lines if not line.startswith(("make ", "pip install "))]
             assert all(line.startswith("python ") for line in lines), text
-            commands = [[sys.executable, *shlex.split(line)[1:]] for line in lines]
+            commands = [["bash", "-c", line] for line in lines]
         else:
             continue
         for command in commands:
             answer = subprocess.run(
-                command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+                command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600, check=False
             )
             assert answer.returncode == 0, f"{' '.join(command[1:])}\n{answer.stdout}\n{answer.stderr}"
 
@@ -70,7 +74,7 @@ def test_commands_of_the_papers_figures_exist():
         module, verb = command.split()[2:4]
         answer = CliRunner().invoke(apps[module], [verb, "--help"], env={"COLUMNS": "200"})
         assert answer.exit_code == 0, command
-        for run in re.findall(r"runs/(\w+)", command):
+        for run in re.findall(r"runs/paper/(\w+)", command):
             assert (ROOT / "scenarios" / f"{run}.json").exists(), run
         for option in re.findall(r"--[a-z-]+", command):
             assert option in answer.stdout, (command, option)

@@ -1,4 +1,4 @@
-"""Commands on finished runs, and on many at once: report, plot, animate, sweep."""
+"""Commands beside `run`, `check` and `schema`: on shipped scenes, on finished runs, and on many at once."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from warp_mpm.commands.hard_cases import hard_cases
 from warp_mpm.commands.plan import plan
 from warp_mpm.commands.plot import plot
 from warp_mpm.commands.report import report
+from warp_mpm.commands.scenarios import scenarios
 from warp_mpm.commands.sweep import sweep
 from warp_mpm.commands.validate import validate
 
 EXAMPLES: dict[Callable[..., None], str] = {
+    scenarios: "Example: python -m warp_mpm scenarios; all of them: python -m warp_mpm scenarios --out scenarios",
     report: (
         "Example: python -m warp_mpm report runs/set_iib; "
         "two side by side: python -m warp_mpm report runs/case_1 runs/case_1_fixed --out comparison.html"
@@ -26,9 +28,9 @@ EXAMPLES: dict[Callable[..., None], str] = {
         "a scenario before it runs: python -m warp_mpm plot scene scenarios/set_iib.json"
     ),
     animate: "Example: python -m warp_mpm animate runs/set_iib --out set_iib.mp4 --field pore_pressure --speed 0.5",
-    sweep: "Example: python -m warp_mpm sweep docs/sweeps/barrier_mass.json --out runs/barrier_mass --workers 2",
+    sweep: "Example: python -m warp_mpm sweep scenarios/sweeps/barrier_mass.json --out runs/barrier_mass --workers 2",
     accuracy: "Example: python -m warp_mpm accuracy scenarios/case_1.json --quick",
-    hard_cases: "Example: python -m warp_mpm hard-cases --quick --only speed_50 --only falling_jet",
+    hard_cases: "Example: python -m warp_mpm hard-cases --quick --only one_point --only face_90",
     plan: "Example: python -m warp_mpm plan scenarios/case_1.json --what-if",
     benchmark: "Example: python -m warp_mpm benchmark speed --out docs/performance",
     validate: "Example: python -m warp_mpm validate --quick; one case: python -m warp_mpm validate --only terzaghi",

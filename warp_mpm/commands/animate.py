@@ -28,8 +28,8 @@ def animate(
 ) -> None:
     """Film a run: the flow coloured by a field, and the force and the displacement as they grow.
 
-    One picture for each snapshot. mp4 needs imageio-ffmpeg (pip install 'warp-mpm-impact[animate]'); gif needs nothing
-    more.
+    One picture for each snapshot. mp4 needs the package imageio-ffmpeg (in a checkout: pip install '.[animate]'); gif
+    needs nothing more.
     """
     with refusals():
         target = out if out is not None else Path(f"{run.resolve().name}.mp4")

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from warp_mpm.scenario import Scenario
+from warp_mpm.shipped import SCENARIOS
 
-FOLDER = Path(__file__).parents[2] / "scenarios" / "hard"
+FOLDER = SCENARIOS / "hard"
 
 LARGE = frozenset({"million_points"})
 """Cases that take minutes on a processor; `--small` and `--quick` leave them out."""

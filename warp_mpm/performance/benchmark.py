@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import platform
 import time
-from pathlib import Path
 from typing import Any
 
 from warp_mpm.effect_rules import with_law, without_liquid
+from warp_mpm.performance.machine import processor
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
 from warp_mpm.performance.table import Progress, Table
 from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.scenario import Scenario
+from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulation import Simulation
 
 SHORT: dict[str, Any] = {"numerics.spacing_m": 0.125, "output.end_time_s": 0.5}
@@ -211,20 +212,14 @@ def _larger_steps(base: Scenario, device: str, progress: Progress) -> Table:
     return Table("steps", "Larger and smaller steps", columns, rows)
 
 
-CASE = Path(__file__).parents[2] / "scenarios" / "case_1.json"
+CASE = SCENARIOS / "case_1.json"
 
 
 def machine() -> dict[str, str]:
     """What the figures were taken on."""
     import warp
 
-    name = platform.processor() or platform.machine()
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    return {"processor": name, "warp": warp.__version__, "python": platform.python_version(), "taken": _today()}
+    return {"processor": processor(), "warp": warp.__version__, "python": platform.python_version(), "taken": _today()}
 
 
 def _today() -> str:

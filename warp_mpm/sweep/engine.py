@@ -6,9 +6,11 @@ import contextlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from warp_mpm.extras import missing
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.run_folder import RunFolder
 from warp_mpm.results import Results, ResultsError
@@ -59,8 +61,9 @@ def run_sweep(
         Rows in the order of the cases: `case`, `status`, `problem`, the varied fields, the key figures (SI).
 
     Raises:
-        SweepError: a case is impossible, or the folder holds another sweep; nothing was run.
+        SweepError: Dask is not installed, a case is impossible, or the folder holds another sweep; nothing was run.
     """
+    _check_installed()
     cases = sweep.cases(base)
     _claim(out, {**sweep.model_dump(mode="json"), "scenario": base.resolved()})
     done = {case.number: row for case in cases if (row := _row_of(case, out, retry_failed)) is not None}
@@ -196,19 +199,29 @@ def _problem(future: Any) -> str:
     return f"{type(error).__name__}: {error}"
 
 
+def _check_installed() -> None:
+    """Ask for the optional packages before hours of runs, not after.
+
+    Raises:
+        SweepError: one is not installed.
+    """
+    try:
+        for package in ("distributed", "pandas", "pyarrow"):
+            import_module(package)
+    except ModuleNotFoundError:
+        raise SweepError(missing("sweep", "Dask, pandas and pyarrow", "sweep")) from None
+
+
 @contextmanager
 def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """A connection to a scheduler that has workers.
 
     Raises:
-        SweepError: Dask is not installed, or the scheduler does not answer.
+        SweepError: the scheduler does not answer.
     """
-    try:
-        import dask
-        import distributed
-        import pandas  # noqa: F401 - asked for before hours of runs, not after
-    except ImportError:
-        raise SweepError("sweep needs Dask, pandas and pyarrow: pip install 'warp-mpm-impact[sweep]'") from None
+    import dask
+    import distributed
+
     with dask.config.set({"distributed.scheduler.allowed-failures": ALLOWED_FAILURES}):
         if scheduler is not None:
             try:

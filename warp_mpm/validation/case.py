@@ -205,5 +205,3 @@ class Case:
     """Called with True for the quick variant: a coarser or shorter run of the same checks."""
     in_quick: bool = True
     """Whether a quick validation of everything includes it."""
-    needs_scenes: bool = False
-    """Whether it reads scenario files of the source tree."""

@@ -15,6 +15,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from analytic.whole_file import write_whole
+from warp_mpm.performance.machine import processor
 from warp_mpm.plotting.style import GREY, RUN_COLOURS, grid, save
 from warp_mpm.validation.case import Case, Check, Outcome, Panel, number
 
@@ -52,7 +53,8 @@ def write(folder: Path, results: Sequence[Result], *, quick: bool, versions: str
     pictures.mkdir(parents=True, exist_ok=True)
     lines = [INTRODUCTION]
     how = "quick variants" if quick else "full variants"
-    lines.append(f"Computed with {versions}; {how}, {sum(result.seconds for result in results):.0f} s on one core.\n")
+    seconds = sum(result.seconds for result in results)
+    lines.append(f"Computed with {versions}; {how}, {seconds:.0f} s on one core ({processor()}).\n")
     lines.append("| case | verdict | largest error over its limit | time |\n| --- | --- | --- | --- |")
     for result in results:
         lines.append(

@@ -370,6 +370,5 @@ CASES = (
         "ours converge to",
         run=paper,
         in_quick=False,
-        needs_scenes=True,
     ),
 )

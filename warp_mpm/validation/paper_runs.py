@@ -16,10 +16,9 @@ from warp_mpm.effect_rules import with_law
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
+from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulation import Simulation
 from warp_mpm.validation.case import Array
-
-SCENES = Path(__file__).parents[2] / "scenarios"
 
 TITLES = {
     "case_1": "case 1",
@@ -100,7 +99,7 @@ class PaperRun:
 def paper_scene(name: str, spacing: float, law: str | None = None, **changes: Any) -> Scenario:
     """One of the paper's scenes at a spacing [m], with another law or fields changed: `barrier__friction=0`."""
     fields = {path.replace("__", "."): value for path, value in changes.items()}
-    scenario = Scenario.load(SCENES / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
+    scenario = Scenario.load(SCENARIOS / f"{name}.json").replaced({"numerics.spacing_m": spacing, **fields})
     return scenario if law is None else scenario.replaced(with_law(scenario, law))
 
 

@@ -223,7 +223,6 @@ CASES = (
         source="projection: corner means with bilinear hats",
         limit="root mean square 3 % of ρ_m v²",
         run=pressure_quality,
-        needs_scenes=True,
     ),
     Case(
         name="refinement",
@@ -233,6 +232,5 @@ CASES = (
         limit="reported: observed order, extrapolated value, error of the shipped scenes",
         run=refinement,
         in_quick=False,
-        needs_scenes=True,
     ),
 )
