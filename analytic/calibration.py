@@ -25,6 +25,7 @@ from analytic.force_record import (
     FILTER_WINDOW,
     START_SHARE,
     cumulative_impulse,
+    filtered_peak,
     impact_end,
     moving_mean,
     still_rises,
@@ -130,7 +131,7 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
     if not (math.isfinite(filter_window) and filter_window >= 0):
         raise CalibrationError(f"filter_window is {filter_window:g}, it must be a number in [0, inf).")
     filtered = moving_mean(time, force, filter_window)
-    peak = int(np.argmax(filtered))
+    peak = filtered_peak(filtered)
     if not (force.max() > 0 and filtered[peak] > 0):
         raise NoImpactError("The force is never above nil, there is no impact to calibrate on.")
     first = int(np.argmax(force > START_SHARE * force.max()))
@@ -202,6 +203,8 @@ def calibrate(
     measured = measure(time, force, filter_window)
     if measured.rises:
         raise CalibrationError("The force still rises when the record ends, there is no peak to calibrate on.")
+    if not measured.rise_time > 0:
+        raise CalibrationError("The force falls from where the record begins, there is no rise to calibrate on.")
     s1max, rise_ratio = _by_peak(measured, scene)
     if rule == "least_squares":
         s1max, rise_ratio = _by_least_squares(time, force, measured, scene, start=(s1max, rise_ratio))
@@ -388,9 +391,10 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured | None)
 def bounded_from_below(series: Mapping[str, Array], measured: Measured | None) -> tuple[str, ...]:
     """Names of the key figures that a record only bounds from below, because impact or sliding outlast it."""
     found = ["peak_force", "impulse"] if measured is None else list(measured.at_least)
-    if not at_rest(series):
+    to_come = measured is None or measured.rises
+    if "barrier_velocity" in series and (to_come or not at_rest(series)):
         found.append("barrier_displacement_final")
-        if series["barrier_velocity"][-1] == series["barrier_velocity"].max():
+        if to_come or series["barrier_velocity"][-1] == series["barrier_velocity"].max():
             found += ["barrier_velocity_max", "barrier_kinetic_energy_max"]
     return tuple(found)
 

@@ -43,9 +43,16 @@ def moving_mean(time: Array, force: Array, window: float = FILTER_WINDOW) -> Arr
     return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
 
 
+def filtered_peak(filtered: Array) -> int:
+    """Place of the greatest filtered force; of places that differ by rounding alone the last."""
+    peak = float(filtered.max())
+    return int(np.flatnonzero(filtered >= peak - ROUNDING_SHARE * abs(peak))[-1])
+
+
 def still_rises(filtered: Array) -> bool:
-    """Whether a filtered force [N/m] is greatest where its record ends: what its peak will be is not known."""
-    return len(filtered) > 0 and bool(filtered[-1] > 0.0) and int(np.argmax(filtered)) == len(filtered) - 1
+    """Whether a filtered force [N/m] is above nil and nowhere greater than where its record ends: what its peak will be
+    is not known."""
+    return len(filtered) > 0 and bool(filtered[-1] > 0.0) and filtered_peak(filtered) == len(filtered) - 1
 
 
 @dataclass(frozen=True)

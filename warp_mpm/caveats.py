@@ -75,7 +75,7 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
     precision = record.get("effects", {}).get("precision", "float64")
     for name, bound in BOUNDS[precision].items():
         value = summary.get(name)
-        if value is not None and value > bound:
+        if value is not None and not value <= bound:  # one that is no number calls for a remark
             found.append(f"{name} = {value:.2g} is above {bound:g}.")
     if summary.get("peak_force") == 0.0:
         found.append("The flow did not touch the barrier.")
@@ -86,8 +86,8 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
         )
     if summary.get("force_still_rises"):
         found.append(
-            "The force still rises at the end of the run: its peak is not known; peak, impulse, volumes and mechanism "
-            "are those so far."
+            "The force still rises at the end of the run: its peak is not known; force, impulse, displacement, "
+            "volumes and mechanism are those so far."
         )
     elif impact_goes_on(summary):
         found.append(

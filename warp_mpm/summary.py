@@ -16,6 +16,7 @@ from analytic.force_record import (
     SETTLED_SHARE,
     START_SHARE,
     cumulative_impulse,
+    filtered_peak,
     impact_end,
     moving_mean,
     still_rises,
@@ -135,19 +136,19 @@ def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
     figures["impulse"] = float(impulse[-1])
     peak = int(np.argmax(force))
     filtered = moving_mean(time, force)
-    filtered_peak = int(np.argmax(filtered))
-    if not (force[peak] > 0.0 and filtered[filtered_peak] > 0.0):
+    highest = filtered_peak(filtered)
+    if not (force[peak] > 0.0 and filtered[highest] > 0.0):
         return figures | {"peak_force": max(float(force[peak]), 0.0)}
     rises = still_rises(filtered)
     start = float(time[max(int(np.argmax(force > START_SHARE * force[peak])) - 1, 0)])
     figures |= {
         "peak_force": float(force[peak]),
         "peak_force_time": float(time[peak]),
-        "peak_force_filtered": float(filtered[filtered_peak]),
-        "peak_force_filtered_time": float(time[filtered_peak]),
+        "peak_force_filtered": float(filtered[highest]),
+        "peak_force_filtered_time": float(time[highest]),
         "force_still_rises": rises,
         "impact_start_time": start,
-        "rise_time": None if rises else float(time[filtered_peak]) - start,
+        "rise_time": None if rises else float(time[highest]) - start,
     }
     end = impact_end(time, force, filtered, start)
     figures["residual_force"] = end.residual_force
@@ -178,12 +179,13 @@ def momentum_error(series: Series, gravity: float) -> float | None:
     residual = np.hypot(series["momentum_residual_x"], series["momentum_residual_y"]).max()
     momentum = np.hypot(series["momentum_x"], series["momentum_y"]).max()
     mass = series["solid_mass"][0] + (series["liquid_mass"][0] if "liquid_mass" in series else 0.0)
-    scale = max(float(momentum), float(mass * gravity * (series["time"][-1] - series["time"][0])))
-    return float(residual) / scale if scale > STANDSTILL * float(mass) else None
+    scale = float(np.maximum(momentum, mass * gravity * (series["time"][-1] - series["time"][0])))
+    return None if scale <= STANDSTILL * float(mass) else float(residual) / scale
 
 
 def energy_error(series: Series) -> float | None:
-    """Greatest energy created, over the flow's initial energy; 0 where energy was only lost."""
+    """Greatest energy created, over the flow's initial energy; 0 where energy was only lost, NaN where an energy is no
+    number."""
     parts: Sequence[str] = ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy")
     if any(part not in series for part in parts):
         return None
@@ -191,7 +193,7 @@ def energy_error(series: Series) -> float | None:
     total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0) - series.get("seepage_work", 0.0)
     scale = float(sum(abs(series[part][0]) for part in parts))
     # Unlike max, which takes 0 where it is offered no number.
-    return float(np.maximum((total - total[0]).max(), 0.0)) / scale if scale > 0.0 else None
+    return None if scale == 0.0 else float(np.maximum((total - total[0]).max(), 0.0)) / scale
 
 
 def _peak(series: Series, name: str) -> tuple[float | None, float | None]:

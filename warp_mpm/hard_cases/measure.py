@@ -154,9 +154,10 @@ def _energy_error(columns: dict[str, Array], undecided: float) -> float:
     work = columns.get("barrier_work", np.zeros(1))
     total = sum(parts) + columns["left_energy"] + work - columns.get("seepage_work", 0.0)
     # A driven barrier puts energy in by its work, and gravity on a slope by the fall.
-    gained = max(float(np.max(-work)), 0.0) + max(float(np.max(parts[1][0] - parts[1])), 0.0)
+    # Of numpy's, since max takes the other where it is offered no number.
+    gained = np.maximum(np.max(-work), 0.0) + np.maximum(np.max(parts[1][0] - parts[1]), 0.0)
     put_in = sum(abs(float(part[0])) for part in parts) + undecided + gained
-    return max(0.0, float(np.max(total - total[0])) - undecided) / max(put_in, 1e-9)
+    return float(np.maximum(np.max(total - total[0]) - undecided, 0.0) / np.maximum(put_in, 1e-9))
 
 
 def _of_the_series(scenario: Scenario, columns: dict[str, Array], undecided_energy: float) -> dict[str, float]:
@@ -169,7 +170,7 @@ def _of_the_series(scenario: Scenario, columns: dict[str, Array], undecided_ener
         figures["momentum_error"] = closed
     figures["energy_error"] = _energy_error(columns, undecided_energy)
     fastest, bound = float(columns["speed_max"].max()), speed_bound(scenario)
-    figures |= {"speed_max": fastest, "speed_ratio": fastest / bound if bound > 0.0 else fastest}
+    figures |= {"speed_max": fastest, "speed_ratio": fastest if bound == 0.0 else fastest / bound}
     if "pore_pressure_max_anywhere" in columns:
         greatest = float(columns["pore_pressure_max_anywhere"].max())
         figures |= {
@@ -234,7 +235,7 @@ def _yield_excess(scenario: Scenario, stress: Array) -> tuple[float, float]:
     cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
     apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
     excess = np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
-    return float(np.maximum(excess.max(), 0.0)), float(max(np.abs(principal).max(), material.cohesion_Pa))
+    return float(np.maximum(excess.max(), 0.0)), float(np.maximum(np.abs(principal).max(), material.cohesion_Pa))
 
 
 def _trial_stress(scenario: Scenario) -> float:
