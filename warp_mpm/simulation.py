@@ -25,12 +25,23 @@ from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
 from .state import saved
 from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
-from .state.divergence import NAMES, SimulationDiverged, what_diverged
+from .state.divergence import NAMES, SimulationDiverged, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
 from .state.samples import Constants, Totals, sample
 from .time_step import step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
+
+
+LARGEST_FORCE = 1e15
+"""Greatest force [N/m] that a caller may put on the barrier: far beyond any, and its arithmetic stays finite."""
+
+LARGEST_VELOCITY = 1e4
+"""Greatest velocity [m/s] at which a caller may drive the barrier, as in a scenario."""
+
+
+def _out_of_range(name: str, value: float, largest: float, unit: str) -> str:
+    return f"{name} = {value!r} is not allowed; it must be a number from {-largest:g} to {largest:g} {unit}"
 
 
 @cache
@@ -342,15 +353,27 @@ class Simulation:
         return self._clock_entry(at.BARRIER_VELOCITY)
 
     def set_barrier_velocity(self, velocity: float) -> None:
-        """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion."""
+        """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion.
+
+        Raises:
+            ValueError: the barrier is not driven, or the velocity is no number from -10,000 to 10,000.
+        """
         if self.effects.barrier != "driven":
             raise ValueError("set_barrier_velocity needs a barrier whose motion is of the kind 'prescribed'")
+        if not abs(velocity) <= LARGEST_VELOCITY:
+            raise ValueError(_out_of_range("velocity", velocity, LARGEST_VELOCITY, "m/s"))
         self._velocities.fill_(float(velocity))
 
     def set_external_force(self, force: float) -> None:
-        """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
+        """Horizontal force [N/m] on a sliding barrier from now on, positive downstream.
+
+        Raises:
+            ValueError: the barrier does not slide, or the force is no number from -1e15 to 1e15.
+        """
         if self.effects.barrier != "sliding":
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
+        if not abs(force) <= LARGEST_FORCE:
+            raise ValueError(_out_of_range("force", force, LARGEST_FORCE, "N/m"))
         self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1].fill_(float(force))
 
     def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
@@ -403,7 +426,7 @@ class Simulation:
         Keys without the effect they belong to are absent.
 
         Raises:
-            SimulationDiverged: some quantity of a material point is not a finite number.
+            SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number.
         """
         if self._ledger_graph is None:
             self._ledger_graph = self._captured(self._sum_up)
@@ -420,6 +443,11 @@ class Simulation:
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
+        for name, value in values.items():
+            if not math.isfinite(value):
+                raise SimulationDiverged(
+                    what_is_no_number(name, value, time=self.time, steps=self.steps, scenario=self.scenario)
+                )
         self._last = replace(
             totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
         )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import layout as at
-from ..scenario import Numerics
+from ..scenario import Numerics, Scenario
 
 NAMES = {
     "velocity": "the velocity",
@@ -22,6 +22,27 @@ NAMES = {
 
 class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not a mistake of the caller
     """The run left the range of sense; the message says when and what to try."""
+
+
+def what_is_no_number(name: str, value: float, *, time: float, steps: int, scenario: Scenario) -> str:
+    """When, which quantity of a sample, and what to look at.
+
+    Args:
+        name: of the quantity, as in the time series.
+        value: infinite or no number.
+        time: simulated time [s].
+        steps: time steps so far.
+        scenario: what is run.
+    """
+    moduli = ["young_modulus_Pa", "liquid_bulk_modulus_Pa"]
+    material = scenario.flow.material
+    stiffness = " and ".join(
+        f"flow.material.{field} = {getattr(material, field):g}" for field in moduli if hasattr(material, field)
+    )
+    return (
+        f"The run diverged at t = {time:.6g} s (step {steps}): {name} is {value:g}. Look at {stiffness}, beside the "
+        "pressures that the flow's weight and speed make."
+    )
 
 
 def what_diverged(
