@@ -28,7 +28,7 @@ from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_array
 from .state.divergence import NAMES, SimulationDiverged, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
 from .state.samples import Constants, Totals, sample
-from .time_step import step_limits
+from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
 
@@ -96,6 +96,8 @@ class Simulation:
         self._types = self._kernels.types
         self.grid = fit_grid(scenario)
         self._limits = step_limits(scenario)
+        self.nominal_step = nominal_step(scenario)
+        """The step [s] against which times are told apart: see `time_step.nominal_step`."""
         # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
         self._workers = 1 if self.device.is_cpu else 65536
         self._parameters = kernel_parameters(
@@ -113,7 +115,8 @@ class Simulation:
         mass = scenario.barrier.mass if scenario.barrier is not None else None
         weight = -mass * scenario.gravity.vector[1] if mass is not None else None
         self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
-        self._last = self._totals()
+        self._last = self._before_last = self._totals()
+        """Totals at the last two samples between which a step was made."""
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
@@ -245,14 +248,19 @@ class Simulation:
     def advance(self, until: float) -> None:
         """Run to the time `until` [s], exactly.
 
+        Times that differ by less than a thousandth of a nominal step (`time_step.ONE_TIME`) are one time: no step is
+        made then, and `time` is `until`. What is left out is made up for by the next step.
+
         Raises:
             ValueError: `until` lies in the past or is not finite.
             SimulationDiverged: a quantity is no longer finite or sensible.
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
-        self._target.fill_(until)
         self.prepare()
+        self._target.fill_(until)
+        if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
+            return
         wp.capture_launch(self._graph)
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
@@ -335,7 +343,8 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._clock_entry(at.TIME)
+        reached, asked = self._clock_entry(at.TIME), self._clock_entry(at.TARGET)
+        return asked if 0.0 <= asked - reached < ONE_TIME * self.nominal_step else reached
 
     @property
     def steps(self) -> int:
@@ -421,7 +430,8 @@ class Simulation:
         return Totals(self._read("clock").tolist(), self._read("reactions").tolist())
 
     def sample(self) -> dict[str, float]:
-        """Quantities now, and forces as means over the time since the last sample (impulse over interval).
+        """Quantities now, and forces as means over the time since the last sample (impulse over interval); where no
+        step has been made since, the forces of that sample.
 
         Keys without the effect they belong to are absent.
 
@@ -435,19 +445,23 @@ class Simulation:
         if sums[at.LEDGER_NOT_FINITE] > 0.0:
             raise SimulationDiverged(self._what_diverged())
         totals = self._totals()
+        stepped = totals.clock[at.TIME] > self._last.clock[at.TIME]
         values = sample(
             self._constants,
             totals,
-            self._last,
+            self._last if stepped else self._before_last,
             sums=sums,
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
+        values["time"] = self.time
         for name, value in values.items():
             if not math.isfinite(value):
                 raise SimulationDiverged(
                     what_is_no_number(name, value, time=self.time, steps=self.steps, scenario=self.scenario)
                 )
+        if stepped:
+            self._before_last = self._last
         self._last = replace(
             totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
         )
@@ -500,16 +514,20 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        self._last = Totals(
-            state["last.clock"].tolist(), state["last.reactions"].tolist(), *state["last.seepage"].tolist()
+        self._last, self._before_last = (
+            Totals(
+                state[f"{name}.clock"].tolist(), state[f"{name}.reactions"].tolist(), *state[f"{name}.seepage"].tolist()
+            )
+            for name in ("last", "before_last")
         )
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
-        kept = {
-            "last.clock": self._last.clock,
-            "last.reactions": self._last.reactions,
-            "last.seepage": [self._last.seepage_power, self._last.seepage_work],
-            "initial_momentum": self._initial_momentum,
-        }
+        kept: dict[str, list[float]] = {"initial_momentum": self._initial_momentum}
+        for name, totals in (("last", self._last), ("before_last", self._before_last)):
+            kept |= {
+                f"{name}.clock": totals.clock,
+                f"{name}.reactions": totals.reactions,
+                f"{name}.seepage": [totals.seepage_power, totals.seepage_work],
+            }
         return state | {name: np.array(values) for name, values in kept.items()}

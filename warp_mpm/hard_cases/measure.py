@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mpm.grid import barrier_planes
 from warp_mpm.hard_cases.bounds import impact_speed, pressure_bound, speed_bound
 from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
-from warp_mpm.recording import Schedule
+from warp_mpm.recording import Schedule, record_until
 from warp_mpm.results import Snapshot
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
@@ -67,10 +67,21 @@ def measure(
     return measured
 
 
+@dataclass
+class _Looker:
+    """A recorder that writes nothing."""
+
+    schedule: Schedule
+    record: Callable[[Any], None]
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
 def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Measured:
     started = time.perf_counter()
     simulation = make_simulation(scenario)
-    output, end_time = scenario.output, scenario.output.end_time_s
+    output = scenario.output
     samples: list[dict[str, float]] = []
     noise: list[float] = []
     extremes = dict.fromkeys(("penetration", "porosity_high", "yield_excess", "stress_max"), 0.0) | {
@@ -78,22 +89,22 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
     }
     measured = Measured({"diverged": 0.0})
     undecided_energy = _undecided_energy(scenario, _snapshot(simulation))
-    series, snapshots = Schedule(output.time_series_interval_s), Schedule(output.snapshot_interval_s)
+
+    def look(simulation: Any) -> None:
+        snapshot = _snapshot(simulation)
+        if len(snapshot.position) > 0:
+            _widen(extremes, scenario, snapshot)
+            noise.extend(_pressure_noise(scenario, snapshot))
+            if measured.peak is None or _violence(snapshot) > _violence(measured.peak):
+                measured.peak = snapshot
+        measured.last = snapshot
+
+    recorders = [
+        _Looker(Schedule(output.time_series_interval_s), lambda simulation: samples.append(simulation.sample())),
+        _Looker(Schedule(output.snapshot_interval_s), look),
+    ]
     try:
-        while True:
-            if series.due(simulation.time) or simulation.time >= end_time:
-                samples.append(simulation.sample())
-            if snapshots.due(simulation.time) or simulation.time >= end_time:
-                snapshot = _snapshot(simulation)
-                if len(snapshot.position) > 0:
-                    _widen(extremes, scenario, snapshot)
-                    noise.extend(_pressure_noise(scenario, snapshot))
-                    if measured.peak is None or _violence(snapshot) > _violence(measured.peak):
-                        measured.peak = snapshot
-                measured.last = snapshot
-            if simulation.time >= end_time:
-                break
-            simulation.advance(min(end_time, series.next_time, snapshots.next_time))
+        record_until(simulation, recorders, output.end_time_s)
     except SimulationDiverged as error:
         measured.figures["diverged"], measured.problem = 1.0, str(error)
     if not samples:
