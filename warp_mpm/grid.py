@@ -156,8 +156,10 @@ def contact_nodes(barrier: Barrier, grid: GridLayout, depth_in_cells: float = 4.
     stacked = np.array(distance)
     nearest = stacked.argmax(axis=0)
     outermost = stacked.max(axis=0)
-    touching = (outermost < 0.0) & (outermost > -depth_in_cells) & (y[None, :] > -3.0 * spacing)
+    touching = (outermost < 0.0) & (outermost > -depth_in_cells)
     if isinstance(barrier.shape, Trapezoid):
+        # It stands on the ground, below which lie mirror images alone; a wall goes on down where there is no ground.
+        touching &= y[None, :] > -3.0 * spacing
         crest = barrier.shape.base_crest_height[2]
         inclined = np.array(
             [not level and surface != TOP for level, (surface, _, _) in zip(aligned, planes, strict=True)]
