@@ -25,8 +25,10 @@ from analytic.force_record import (
     FILTER_WINDOW,
     START_SHARE,
     cumulative_impulse,
+    filtered_peak,
     impact_end,
     moving_mean,
+    still_rises,
 )
 from analytic.impact import Impact
 from analytic.scene import Scene
@@ -41,6 +43,10 @@ class CalibrationError(ValueError):
     """A history from which nothing can be calibrated; one sentence that says why."""
 
 
+class NoImpactError(CalibrationError):
+    """A history in which there is no impact, or none yet."""
+
+
 @dataclass(frozen=True)
 class Measured:
     """What a force history says about an impact. Times count from the start of the record, SI units."""
@@ -48,9 +54,12 @@ class Measured:
     arrival_time: float
     """Start of the first interval in which the force exceeds 1 % of its peak [s]."""
     peak_force: float
-    """Largest value of the filtered force [N/m]."""
+    """Largest value of the filtered force [N/m]; where it still rises, that so far."""
     peak_time: float
     """Its time [s]."""
+    rises: bool
+    """Whether the filtered force is largest where the record ends: peak, times and impulse are then bounds from
+    below."""
     end_time: float
     """Time after which the filtered force stays within 10 % of the peak above the residual force [s]."""
     over: bool
@@ -78,6 +87,8 @@ class Measured:
     @property
     def warning(self) -> str | None:
         """One sentence where the impact is not over at the end of the record, else ``None``."""
+        if self.rises:
+            return "the force still rises at the end of the record"
         if self.over:
             return None
         share = self.residual_force / self.peak_force
@@ -86,6 +97,8 @@ class Measured:
     @property
     def at_least(self) -> tuple[str, ...]:
         """Names of the figures that the record only bounds from below."""
+        if self.rises:
+            return ("peak_force", "rise_time", "duration", "impulse")
         return () if self.over else ("duration", "impulse")
 
     @property
@@ -95,7 +108,7 @@ class Measured:
 
 
 def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> Measured:
-    """Peak, times and impulse of a force history.
+    """Peak, times and impulse of a force history, which may end at any moment of the impact.
 
     Parameters
     ----------
@@ -105,21 +118,22 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
 
     Raises
     ------
-    CalibrationError: the arrays do not fit together, hold no number, or no impact.
+    NoImpactError: the force is never above nil.
+    CalibrationError: the arrays do not fit together, hold no number, or fewer than three samples.
     """
     time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
-    if time.ndim != 1 or time.shape != force.shape or len(time) < 3:
+    if time.ndim != 1 or time.shape != force.shape:
         raise CalibrationError(f"time and force have the shapes {time.shape} and {force.shape}, they must be alike.")
+    if len(time) < 3:
+        raise CalibrationError(f"The record has {len(time)} samples, it must have three at least.")
     if not (np.all(np.isfinite(time)) and np.all(np.isfinite(force)) and np.all(np.diff(time) > 0)):
         raise CalibrationError("time and force must be finite, and time must increase.")
     if not (math.isfinite(filter_window) and filter_window >= 0):
         raise CalibrationError(f"filter_window is {filter_window:g}, it must be a number in [0, inf).")
-    if not force.max() > 0:
-        raise CalibrationError("The force is never above nil, there is no impact to calibrate on.")
     filtered = moving_mean(time, force, filter_window)
-    peak = int(np.argmax(filtered))
-    if peak == len(time) - 1:
-        raise CalibrationError("The force still rises when the record ends, there is no peak to calibrate on.")
+    peak = filtered_peak(filtered)
+    if not (force.max() > 0 and filtered[peak] > 0):
+        raise NoImpactError("The force is never above nil, there is no impact to calibrate on.")
     first = int(np.argmax(force > START_SHARE * force.max()))
     arrival = float(time[max(first - 1, 0)])
     impulse = cumulative_impulse(time, force)
@@ -128,6 +142,7 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
         arrival_time=arrival,
         peak_force=float(filtered[peak]),
         peak_time=float(time[peak]),
+        rises=still_rises(filtered),
         end_time=end.time,
         over=end.over,
         impulse=float(np.interp(end.time, time, impulse) - np.interp(arrival, time, impulse)),
@@ -180,12 +195,16 @@ def calibrate(
 
     Raises
     ------
-    CalibrationError: the history holds no impact, or the rule is unknown.
+    CalibrationError: the history holds no impact, or ends before its peak, or the rule is unknown.
     """
     if rule not in RULES:
         raise CalibrationError(f"rule is {rule!r}, it must be one of {', '.join(RULES)}.")
     time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
     measured = measure(time, force, filter_window)
+    if measured.rises:
+        raise CalibrationError("The force still rises when the record ends, there is no peak to calibrate on.")
+    if not measured.rise_time > 0:
+        raise CalibrationError("The force falls from where the record begins, there is no rise to calibrate on.")
     s1max, rise_ratio = _by_peak(measured, scene)
     if rule == "least_squares":
         s1max, rise_ratio = _by_least_squares(time, force, measured, scene, start=(s1max, rise_ratio))
@@ -257,10 +276,17 @@ def measured_vertical_load_ratio(
     time [s], force [N/m]: as in ``measure``.
     base_normal_force: force with which the barrier presses on its base, mean over the interval [N/m].
     weight: with which the barrier alone presses on its base [N/m].
+
+    Raises
+    ------
+    CalibrationError: the force pulls more than it pushes.
     """
     inside = (time > measured.arrival_time) & (time <= measured.end_time)
     widths = np.diff(time, prepend=time[0])[inside]
-    return float((base_normal_force[inside] - weight) @ widths / (force[inside] @ widths))
+    impulse = float(force[inside] @ widths)
+    if not impulse > 0:
+        raise CalibrationError(f"The impulse of the impact is {impulse:g} N s/m, it must be greater than 0.")
+    return float((base_normal_force[inside] - weight) @ widths) / impulse
 
 
 # --- misfits ---------------------------------------------------------------------------------------------------------
@@ -310,8 +336,8 @@ class KeyFigures:
     """The quantities of the paper's Figs. 13 and 14, SI units per metre of width; ``None``: not recorded."""
 
     peak_force: float
-    rise_time: float
-    duration: float
+    rise_time: float | None
+    duration: float | None
     impulse: float
     flow_kinetic_energy_at_peak: float | None
     barrier_kinetic_energy_max: float | None
@@ -335,20 +361,23 @@ def key_figures(impact: Impact) -> KeyFigures:
     )
 
 
-def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> KeyFigures:
-    """Key figures of a record (columns as in ``analytic.time_series``)."""
+def measured_key_figures(series: Mapping[str, Array], measured: Measured | None) -> KeyFigures:
+    """Key figures of a record (columns as in ``analytic.time_series``); ``measured`` is None where there is no impact
+    in it."""
 
     def largest(name: str) -> float | None:
         return float(series[name].max()) if name in series else None
 
     energy = series.get("flow_kinetic_energy")
     return KeyFigures(
-        peak_force=measured.peak_force,
-        rise_time=measured.rise_time,
-        duration=measured.duration,
-        impulse=measured.impulse,
+        peak_force=0.0 if measured is None else measured.peak_force,
+        rise_time=None if measured is None else measured.rise_time,
+        duration=None if measured is None else measured.duration,
+        impulse=0.0 if measured is None else measured.impulse,
         flow_kinetic_energy_at_peak=(
-            None if energy is None else float(np.interp(measured.peak_time, series["time"], energy))
+            None
+            if energy is None or measured is None or measured.rises
+            else float(np.interp(measured.peak_time, series["time"], energy))
         ),
         barrier_kinetic_energy_max=largest("barrier_kinetic_energy"),
         barrier_velocity_max=largest("barrier_velocity"),
@@ -359,12 +388,13 @@ def measured_key_figures(series: Mapping[str, Array], measured: Measured) -> Key
     )
 
 
-def bounded_from_below(series: Mapping[str, Array], measured: Measured) -> tuple[str, ...]:
+def bounded_from_below(series: Mapping[str, Array], measured: Measured | None) -> tuple[str, ...]:
     """Names of the key figures that a record only bounds from below, because impact or sliding outlast it."""
-    found = list(measured.at_least)
-    if not at_rest(series):
+    found = ["peak_force", "impulse"] if measured is None else list(measured.at_least)
+    to_come = measured is None or measured.rises
+    if "barrier_velocity" in series and (to_come or not at_rest(series)):
         found.append("barrier_displacement_final")
-        if series["barrier_velocity"][-1] == series["barrier_velocity"].max():
+        if to_come or series["barrier_velocity"][-1] == series["barrier_velocity"].max():
             found += ["barrier_velocity_max", "barrier_kinetic_energy_max"]
     return tuple(found)
 
@@ -374,9 +404,10 @@ def at_rest(series: Mapping[str, Array]) -> bool:
     return "barrier_velocity" not in series or float(series["barrier_velocity"][-1]) == 0.0
 
 
-def warnings(series: Mapping[str, Array], measured: Measured) -> list[str]:
+def warnings(series: Mapping[str, Array], measured: Measured | None) -> list[str]:
     """What is not over at the end of a record, in sentences without capital and stop."""
-    found = [] if measured.warning is None else [measured.warning]
+    told = "the force is never above nil, there is no impact in the record" if measured is None else measured.warning
+    found = [] if told is None else [told]
     if not at_rest(series):
         speed = float(series["barrier_velocity"][-1])
         found.append(f"the barrier still moves at {speed:.3g} m/s at the end of the record")

@@ -24,20 +24,35 @@ RESIDUAL_SHARE = 0.1
 SETTLED_SHARE = 0.05
 """Share of the peak force below which a residual force has settled, however it changes."""
 
+ROUNDING_SHARE = 1e-9
+"""Share of the peak force by which a steady force may differ from itself."""
+
 
 def cumulative_impulse(time: Array, force: Array) -> Array:
     """Impulse [N s/m] from the first time to each, of forces that are means over the interval before it."""
-    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])
+    return np.concatenate([[0.0], np.cumsum(force[1:] * np.diff(time))])[: len(time)]
 
 
 def moving_mean(time: Array, force: Array, window: float = FILTER_WINDOW) -> Array:
     """Mean force [N/m] over `window` seconds around each time, over what there is of it at the ends of the record."""
-    if window == 0.0:
+    if window == 0.0 or len(time) < 2:
         return force
     impulse = cumulative_impulse(time, force)
     low = np.maximum(time - 0.5 * window, time[0])
     high = np.minimum(time + 0.5 * window, time[-1])
     return (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / (high - low)
+
+
+def filtered_peak(filtered: Array) -> int:
+    """Place of the greatest filtered force; of places that differ by rounding alone the last."""
+    peak = float(filtered.max())
+    return int(np.flatnonzero(filtered >= peak - ROUNDING_SHARE * abs(peak))[-1])
+
+
+def still_rises(filtered: Array) -> bool:
+    """Whether a filtered force [N/m] is above nil and nowhere greater than where its record ends: what its peak will be
+    is not known."""
+    return len(filtered) > 0 and bool(filtered[-1] > 0.0) and filtered_peak(filtered) == len(filtered) - 1
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,8 @@ class ImpactEnd:
     residual_force: float
     """Mean force over the last `RESIDUAL_SHARE` of the record [N/m]."""
     time: float
-    """From which on the filtered force, less the residual one, stays below `END_SHARE` of its peak less that [s]."""
+    """From which on the filtered force, less the residual one, stays below `END_SHARE` of its peak less that [s]; the
+    end of the record where it never does."""
     over: bool
     """Whether that time lies before the last `RESIDUAL_SHARE`, and the force has settled by then. It has not where the
     residual force is above `SETTLED_SHARE` of the peak and, at the rate of its last change, would change by more than
@@ -58,7 +74,7 @@ def impact_end(time: Array, force: Array, filtered: Array, start: float) -> Impa
     """The end of an impact.
 
     Args:
-        time: ends of the intervals [s], the first the start of the record.
+        time: ends of the intervals [s], two at least, increasing, the first the start of the record.
         force: mean over the interval that ends then [N/m].
         filtered: its moving mean [N/m], somewhere above nil.
         start: time at which the impact starts [s].
@@ -72,6 +88,8 @@ def impact_end(time: Array, force: Array, filtered: Array, start: float) -> Impa
     to_come = abs(residual - float(at_tail - before) / tenth) / tenth * (float(time[-1]) - start)
     settled = residual <= SETTLED_SHARE * peak or to_come <= END_SHARE * peak
     level = max(residual, 0.0)
-    above = np.flatnonzero(filtered >= level + END_SHARE * (peak - level))
-    end = float(time[min(int(above[-1]) + 1, len(time) - 1)])
+    above = np.flatnonzero(filtered >= level + END_SHARE * (peak - level) - ROUNDING_SHARE * peak)
+    # The residual force is above the filtered peak where the force rises to the end: then nothing has fallen yet.
+    last = int(above[-1]) if len(above) else len(time) - 1
+    end = float(time[min(last + 1, len(time) - 1)])
     return ImpactEnd(residual, end, bool(settled) and end <= tail)

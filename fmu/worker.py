@@ -20,9 +20,6 @@ from fmu.units.worker_process import PROTOCOL
 HOST_CHECK_INTERVAL = 0.5
 """Time between looks at whether the host is still there [s], for a host that ends during a long step."""
 
-WARM_UP_TIME = 1e-9
-"""Simulated time [s] of the step that compiles the kernels; it is undone."""
-
 
 class RefusedRequestError(Exception):
     """A request that cannot be met; the message is one sentence for the importer."""
@@ -53,9 +50,7 @@ class Worker:
         if changes:
             self.scenario = self.scenario.replaced(changes)
         self.simulation = Simulation(self.scenario, device=device)
-        beginning = self.simulation.save_state()
-        self.simulation.advance(until=WARM_UP_TIME)
-        self.simulation.restore_state(beginning)
+        self.simulation.prepare()
         return {}
 
     def step(

@@ -77,7 +77,7 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
     precision = record.get("effects", {}).get("precision", "float64")
     for name, bound in BOUNDS[precision].items():
         value = summary.get(name)
-        if value is not None and value > bound:
+        if value is not None and not value <= bound:  # one that is no number calls for a remark
             found.append(f"{name} = {value:.2g} is above {bound:g}.")
     if summary.get("peak_force") == 0.0:
         found.append("The flow did not touch the barrier.")
@@ -86,7 +86,12 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
             f"The barrier still slides at {summary['barrier_velocity_final']:.3g} m/s at the end of the run: its "
             "displacement is not final."
         )
-    if impact_goes_on(summary):
+    if summary.get("force_still_rises"):
+        found.append(
+            "The force still rises at the end of the run: its peak is not known; force, impulse, displacement, "
+            "volumes and mechanism are those so far."
+        )
+    elif impact_goes_on(summary):
         found.append(
             "The impact is not over at the end of the run: its duration is not known; impulse, volumes and mechanism "
             "are those so far."
@@ -95,5 +100,5 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
 
 
 def impact_goes_on(summary: Mapping[str, Any]) -> bool:
-    """The force on the face is still falling at the end of the run."""
+    """The force on the face still rises or falls at the end of the run."""
     return bool(summary.get("peak_force")) and summary.get("impact_end_time") is None

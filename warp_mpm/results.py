@@ -289,7 +289,7 @@ def read_time_series(path: Path) -> dict[str, Array]:
     """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
 
     Raises:
-        ResultsError: the file is missing or damaged.
+        ResultsError: the file is missing or damaged, or a number in it is not finite.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -314,4 +314,9 @@ def read_time_series(path: Path) -> dict[str, Array]:
             values[number] = [float(cell) for cell in cells]
         except ValueError:
             raise ResultsError(f"{path} is damaged in line {number + 2}.") from None
+    if not np.isfinite(values).all():
+        line, column = np.argwhere(~np.isfinite(values))[0]
+        raise ResultsError(
+            f"{path} line {line + 2}: {names[header[column]]} is {values[line, column]:g}, it must be a finite number."
+        )
     return {names[label]: values[:, column] for column, label in enumerate(header)}

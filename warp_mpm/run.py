@@ -240,7 +240,7 @@ def evaluate(path: Path) -> dict[str, Any]:
     """Write the summary and the figures of a run folder from its records, and return the summary.
 
     Raises:
-        ResultsError: the records cannot be read.
+        ResultsError: the records cannot be read, or a figure is no finite number.
     """
     from warp_mpm import plotting  # a third of a second, which the first step does not wait for
 
@@ -249,7 +249,7 @@ def evaluate(path: Path) -> dict[str, Any]:
     taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
     with results.snapshots as snapshots:
         of_the_run = {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
-        summary = run_folder.finite(summarize(results.scenario, results.time_series, snapshots, of_the_run))
+        summary = summarize(results.scenario, results.time_series, snapshots, of_the_run)
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
         with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw

@@ -29,10 +29,10 @@ from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, point_arrays
-from .state.divergence import SimulationDiverged, diverging, what_diverged
+from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
 from .state.samples import BarrierNow, Constants, Totals, sample
-from .time_step import step_limits
+from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
 
@@ -59,6 +59,22 @@ def _check_room(bodies: Sequence[Body], initial: MaterialPoints, spacing: float)
         inside = int((body.outline.distance(initial.position) < -1e-9 * spacing).sum())
         if inside:
             raise ValueError(f"{body.name} holds {inside} material points of the flow; it must lie outside the flow")
+
+
+LARGEST_FORCE = 1e15
+"""Greatest force [N/m] that a caller may put on the barrier: far beyond any, and its arithmetic stays finite."""
+
+LARGEST_VELOCITY = 1e4
+"""Greatest velocity [m/s] at which a caller may drive the barrier, as in a scenario."""
+
+
+def _totals_of(numbers: NDArray[np.float64], reactions: NDArray[np.float64]) -> Totals:
+    time, base_impulse, power, work = numbers.tolist()
+    return Totals(time, reactions.tolist(), base_impulse, power, work)
+
+
+def _out_of_range(name: str, value: float, largest: float, unit: str) -> str:
+    return f"{name} = {value!r} is not allowed; it must be a number from {-largest:g} to {largest:g} {unit}"
 
 
 @cache
@@ -117,6 +133,8 @@ class Simulation:
         self._kernels = build_kernels(self.effects)
         self._types = self._kernels.types
         self._limits = step_limits(scenario)
+        self.nominal_step = nominal_step(scenario)
+        """The step [s] against which times are told apart: see `time_step.nominal_step`."""
         # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
         self._workers = 1 if self.device.is_cpu else 65536
         self._parameters = kernel_parameters(
@@ -147,7 +165,8 @@ class Simulation:
         self._ledger_graph: Any = None
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
         self._constants = Constants(self.effects, self.bodies, self._barrier, scenario.gravity.vector)
-        self._last = self._totals()
+        self._last = self._before_last = self._totals()
+        """Totals at the last two samples between which a step was made."""
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
@@ -247,14 +266,19 @@ class Simulation:
     def advance(self, until: float) -> None:
         """Run to the time `until` [s], exactly.
 
+        Times that differ by less than a thousandth of a nominal step (`time_step.ONE_TIME`) are one time: no step is
+        made then, and `time` is `until`. What is left out is made up for by the next step.
+
         Raises:
             ValueError: `until` lies in the past or is not finite.
             SimulationDiverged: a quantity is no longer finite or sensible.
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
-        self._target.fill_(until)
         self.prepare()
+        self._target.fill_(until)
+        if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
+            return
         wp.capture_launch(self._graph)
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
@@ -341,7 +365,8 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._clock_entry(at.TIME)
+        reached, asked = self._clock_entry(at.TIME), self._clock_entry(at.TARGET)
+        return asked if 0.0 <= asked - reached < ONE_TIME * self.nominal_step else reached
 
     @property
     def steps(self) -> int:
@@ -387,16 +412,28 @@ class Simulation:
         return float(self._read(field)[self._barrier]) if field in self._body_arrays else 0.0
 
     def set_barrier_velocity(self, velocity: float) -> None:
-        """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion."""
+        """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion.
+
+        Raises:
+            ValueError: the barrier is not driven, or the velocity is no number from -10,000 to 10,000.
+        """
         if self._barrier is None or not isinstance(self.bodies[self._barrier].motion, Driven):
             raise ValueError("set_barrier_velocity needs a barrier whose motion is of the kind 'prescribed'")
+        if not abs(velocity) <= LARGEST_VELOCITY:
+            raise ValueError(_out_of_range("velocity", velocity, LARGEST_VELOCITY, "m/s"))
         first, last = self._body_arrays["first_time"].numpy()[self._barrier : self._barrier + 2]
         self._body_arrays["velocities"][first:last].fill_(wp.vec2d(float(velocity), 0.0))
 
     def set_external_force(self, force: float) -> None:
-        """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
+        """Horizontal force [N/m] on a sliding barrier from now on, positive downstream.
+
+        Raises:
+            ValueError: the barrier does not slide, or the force is no number from -1e15 to 1e15.
+        """
         if self._barrier is None or not isinstance(self.bodies[self._barrier].motion, Sliding):
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
+        if not abs(force) <= LARGEST_FORCE:
+            raise ValueError(_out_of_range("force", force, LARGEST_FORCE, "N/m"))
         self._body_arrays["external_force"][self._barrier : self._barrier + 1].fill_(float(force))
 
     def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
@@ -448,12 +485,13 @@ class Simulation:
         return Totals(self.time, self._read("reactions").tolist(), base_impulse)
 
     def sample(self) -> dict[str, float]:
-        """Quantities now, and forces as means over the time since the last sample (impulse over interval).
+        """Quantities now, and forces as means over the time since the last sample (impulse over interval); where no
+        step has been made since, the forces of that sample.
 
         Keys without the effect they belong to are absent.
 
         Raises:
-            SimulationDiverged: some quantity of a material point is not a finite number.
+            SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number.
         """
         if self._ledger_graph is None:
             self._ledger_graph = self._captured(self._sum_up)
@@ -470,10 +508,11 @@ class Simulation:
                 self._barrier_number("work"),
                 self._barrier_number("base_work"),
             )
+        stepped = totals.time > self._last.time
         values = sample(
             self._constants,
             totals,
-            self._last,
+            self._last if stepped else self._before_last,
             barrier=barrier,
             balance=self._read("balance").tolist(),
             clock=self._read("clock").tolist(),
@@ -481,6 +520,14 @@ class Simulation:
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
+        values["time"] = self.time
+        for name, value in values.items():
+            if not math.isfinite(value):
+                raise SimulationDiverged(
+                    what_is_no_number(name, value, time=self.time, steps=self.steps, scenario=self.scenario)
+                )
+        if stepped:
+            self._before_last = self._last
         self._last = replace(
             totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
         )
@@ -536,19 +583,14 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        time, *rest = state["last.numbers"].tolist()
-        self._last = Totals(time, state["last.reactions"].tolist(), *rest)
+        self._last, self._before_last = (
+            _totals_of(state[f"{name}.numbers"], state[f"{name}.reactions"]) for name in ("last", "before_last")
+        )
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
-        kept = {
-            "last.numbers": [
-                self._last.time,
-                self._last.base_impulse,
-                self._last.seepage_power,
-                self._last.seepage_work,
-            ],
-            "last.reactions": self._last.reactions,
-            "initial_momentum": self._initial_momentum,
-        }
+        kept: dict[str, list[float]] = {"initial_momentum": self._initial_momentum}
+        for name, totals in (("last", self._last), ("before_last", self._before_last)):
+            kept[f"{name}.numbers"] = [totals.time, totals.base_impulse, totals.seepage_power, totals.seepage_work]
+            kept[f"{name}.reactions"] = totals.reactions
         return state | {name: np.array(values) for name, values in kept.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,11 +16,13 @@ from analytic.force_record import (
     SETTLED_SHARE,
     START_SHARE,
     cumulative_impulse,
+    filtered_peak,
     impact_end,
     moving_mean,
+    still_rises,
 )
 from warp_mpm import mechanism
-from warp_mpm.results import Snapshots
+from warp_mpm.results import ResultsError, Snapshots
 from warp_mpm.scenario import Scenario, Sliding
 
 Array = NDArray[np.float64]
@@ -27,10 +30,11 @@ Series = Mapping[str, Array]
 
 DEFINITIONS = {
     "peak_force": "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
-    "its time is the end of that interval",
+    "its time is the end of that interval; where force_still_rises, that so far, at least",
     "peak_force_filtered": f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
+    "force_still_rises": "whether that moving mean is greatest where the run ends; null without an impact",
     "impact_start_time": f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
-    "rise_time": "T1: peak_force_filtered_time less impact_start_time",
+    "rise_time": "T1: peak_force_filtered_time less impact_start_time; null where force_still_rises",
     "residual_force": f"mean force over the last {RESIDUAL_SHARE:.0%} of the run",
     "impact_end_time": (
         "first time after the peak from which the filtered force, less the residual force, stays below "
@@ -42,6 +46,7 @@ DEFINITIONS = {
     "impact_duration": "T2: impact_end_time less impact_start_time",
     "impulse": "time integral of the horizontal force on the impacted face over the whole run",
     "impact_impulse": "the same from impact_start_time to impact_end_time",
+    "barrier_velocity_max": "greatest velocity downstream; 0 of a barrier that only slides upstream",
     "barrier_displacement_final": "at the end of the run; not final unless barrier_at_rest",
     "pore_pressure_max": (
         "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
@@ -65,14 +70,20 @@ DEFINITIONS = {
 def summarize(
     scenario: Scenario, series: Series, snapshots: Snapshots | None, run: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """All key figures; one that the scene does not have, or that was not reached, is None.
+    """All key figures of a run that may have ended at any moment; one that the scene does not have, or that was not
+    reached, is None.
 
     Args:
         scenario: what was run.
         series: columns of the time series.
         snapshots: None leaves out what is measured on them.
         run: what the run knows of itself (`material_points`, `steps`, `wall_time`, ...), taken over as it is.
+
+    Raises:
+        ResultsError: the series has no sample, or a figure is no finite number.
     """
+    if len(series["time"]) == 0:
+        raise ResultsError("The time series has no sample: the run ended before its first.")
     figures: dict[str, Any] = {"title": scenario.title, "end_time": float(series["time"][-1]), **run}
     figures |= impact_figures(series["time"], series.get("impact_force_x"))
     for name, column in (
@@ -93,39 +104,51 @@ def summarize(
     figures["mass_error"] = mass_error(series)
     figures["momentum_error"] = momentum_error(series, scenario.gravity.acceleration_m_per_s2)
     figures["energy_error"] = energy_error(series)
+    for name, value in (figures | figures.get("mechanism_measures", {})).items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ResultsError(f"{name} is {value}; every figure of a run must be a finite number.")
     figures["definitions"] = DEFINITIONS
     return figures
 
 
 def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
-    """Peak, times and impulses of the force on the impacted face (`DEFINITIONS`).
+    """Peak, times and impulses of the force on the impacted face (`DEFINITIONS`), of a record that may end at any
+    moment and have any shape.
 
     Args:
-        time: ends of the intervals [s], the first the start of the run.
+        time: ends of the intervals [s], increasing, the first the start of the run.
         force: mean over the interval that ends then [N/m]; None without a barrier.
+
+    Raises:
+        ValueError: a force is no finite number.
     """
     names = (
-        *("peak_force", "peak_force_time", "peak_force_filtered", "peak_force_filtered_time", "residual_force"),
-        *("impact_start_time", "impact_end_time", "rise_time", "impact_duration", "impulse", "impact_impulse"),
+        *("peak_force", "peak_force_time", "peak_force_filtered", "peak_force_filtered_time", "force_still_rises"),
+        *("residual_force", "impact_start_time", "impact_end_time", "rise_time", "impact_duration", "impulse"),
+        "impact_impulse",
     )
     figures: dict[str, float | None] = dict.fromkeys(names)
     if force is None or len(time) < 2:
         return figures
+    if not np.isfinite(force).all():
+        raise ValueError(f"The impact force at t = {time[~np.isfinite(force)][0]:g} s is not a finite number.")
     impulse = cumulative_impulse(time, force)
     figures["impulse"] = float(impulse[-1])
     peak = int(np.argmax(force))
-    if not force[peak] > 0.0:
-        return figures | {"peak_force": 0.0}
     filtered = moving_mean(time, force)
-    filtered_peak = int(np.argmax(filtered))
+    highest = filtered_peak(filtered)
+    if not (force[peak] > 0.0 and filtered[highest] > 0.0):
+        return figures | {"peak_force": max(float(force[peak]), 0.0)}
+    rises = still_rises(filtered)
     start = float(time[max(int(np.argmax(force > START_SHARE * force[peak])) - 1, 0)])
     figures |= {
         "peak_force": float(force[peak]),
         "peak_force_time": float(time[peak]),
-        "peak_force_filtered": float(filtered[filtered_peak]),
-        "peak_force_filtered_time": float(time[filtered_peak]),
+        "peak_force_filtered": float(filtered[highest]),
+        "peak_force_filtered_time": float(time[highest]),
+        "force_still_rises": rises,
         "impact_start_time": start,
-        "rise_time": float(time[filtered_peak]) - start,
+        "rise_time": None if rises else float(time[highest]) - start,
     }
     end = impact_end(time, force, filtered, start)
     figures["residual_force"] = end.residual_force
@@ -156,19 +179,21 @@ def momentum_error(series: Series, gravity: float) -> float | None:
     residual = np.hypot(series["momentum_residual_x"], series["momentum_residual_y"]).max()
     momentum = np.hypot(series["momentum_x"], series["momentum_y"]).max()
     mass = series["solid_mass"][0] + (series["liquid_mass"][0] if "liquid_mass" in series else 0.0)
-    scale = max(float(momentum), float(mass * gravity * (series["time"][-1] - series["time"][0])))
-    return float(residual) / scale if scale > STANDSTILL * float(mass) else None
+    scale = float(np.maximum(momentum, mass * gravity * (series["time"][-1] - series["time"][0])))
+    return None if scale <= STANDSTILL * float(mass) else float(residual) / scale
 
 
 def energy_error(series: Series) -> float | None:
-    """Greatest energy created, over the flow's initial energy; 0 where energy was only lost."""
+    """Greatest energy created, over the flow's initial energy; 0 where energy was only lost, NaN where an energy is no
+    number."""
     parts: Sequence[str] = ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy")
     if any(part not in series for part in parts):
         return None
     total = sum((series[part] for part in parts), np.zeros(len(series["time"])))
     total = total + series.get("left_energy", 0.0) + series.get("barrier_work", 0.0) - series.get("seepage_work", 0.0)
     scale = float(sum(abs(series[part][0]) for part in parts))
-    return max(0.0, float((total - total[0]).max())) / scale if scale > 0.0 else None
+    # Unlike max, which takes 0 where it is offered no number.
+    return None if scale == 0.0 else float(np.maximum((total - total[0]).max(), 0.0)) / scale
 
 
 def _peak(series: Series, name: str) -> tuple[float | None, float | None]:

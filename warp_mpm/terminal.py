@@ -142,7 +142,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("  over one record", kilo("peak_force", "kN/m", "peak_force_time")),
         ("impulse", kilo("impulse", "kN s/m")),
         ("impact from", plain("impact_start_time", "s", 3)),
-        ("rise time T₁, duration T₂", _pair(plain("rise_time", "s", 3), plain("impact_duration", "s", 3))),
+        ("rise time T₁, duration T₂", _times(summary)),
         ("pore pressure, greatest", kilo("pore_pressure_max", "kPa", "pore_pressure_max_time")),
         (
             "  at a single point, noise and all",
@@ -184,8 +184,12 @@ def sliding_distance(summary: Mapping[str, Any]) -> str:
     return ("≥ " if summary.get("barrier_at_rest") is False else "") + f"{value:,.4g}"
 
 
-def _pair(first: str | None, second: str | None) -> str | None:
-    return None if first is None else f"{first}, {second or 'not over at the end of the run'}"
+def _times(summary: Mapping[str, Any]) -> str | None:
+    """Rise time and duration of the impact, as far as the run tells them; None where there is none."""
+    rise, duration = summary.get("rise_time"), summary.get("impact_duration")
+    if rise is None:
+        return "the force still rises at the end of the run" if summary.get("force_still_rises") else None
+    return f"{rise:,.3f} s, " + ("not over at the end of the run" if duration is None else f"{duration:,.3f} s")
 
 
 def _state(progress: RunProgress) -> str:

@@ -11,6 +11,14 @@ from .scenario import STANDARD_GRAVITY, Scenario, TwoPhaseFlow, UndrainedFlow, U
 from .simulator.laws import LAWS
 from .simulator.schemes import SCHEMES, Scheme
 
+ONE_TIME = 1e-3
+"""Share of a nominal step by which two times may differ and be one: no step is made from one to the other. Times that
+are meant to be equal differ by their rounding; the impulse of a contact does not vanish with the step, so that a mean
+force over less would be of any size."""
+
+SHORTEST_RECORD = 0.1
+"""Least share of a nominal step that a record of a run covers: records that lie closer are made at one time."""
+
 
 @dataclass(frozen=True)
 class StepLimits:
@@ -130,6 +138,15 @@ def _lone_point_speed(scenario: Scenario, sound: float) -> float:
     if isinstance(material, UndrainedMaterial) and material.cavitation_pressure_Pa > 0.0:
         speed = max(speed, sound / lone_point_courant_number(0.5, scheme))
     return speed
+
+
+def nominal_step(scenario: Scenario) -> float:
+    """The step [s] against which times are told apart (`ONE_TIME`, `SHORTEST_RECORD`): the longest that is stable as
+    the flow starts, or the shortest interval of the output where that is less."""
+    numerics, output, limits = scenario.numerics, scenario.output, step_limits(scenario)
+    stable = min(numerics.spacing_m / (limits.wave_speed + scenario.flow.speed), limits.drag_step)
+    intervals = (output.time_series_interval_s, output.snapshot_interval_s, output.end_time_s)
+    return min(numerics.courant_number * stable, *intervals)
 
 
 def step_limits(scenario: Scenario) -> StepLimits:

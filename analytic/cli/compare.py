@@ -95,13 +95,16 @@ def _figures(
     filter_window: float,
 ) -> tuple[dict[str, Any], Scene, list[str]]:
     """Key figures by source, the scene, and what is to be known of both, of a run folder or a scenario file."""
-    from analytic.calibration import key_figures, measure, measured_key_figures, warnings
+    from analytic.calibration import NoImpactError, key_figures, measure, measured_key_figures, warnings
 
     rows: dict[str, Any] = {}
     notes: list[str] = []
     if path.is_dir():
         _, series, scene = load(path, None)
-        measured = measure(series["time"], series["impact_force_x"], filter_window)
+        try:
+            measured = measure(series["time"], series["impact_force_x"], filter_window)
+        except NoImpactError:
+            measured = None
         rows[SIMULATED] = measured_key_figures(series, measured)
         notes += [f"≥: {warning}." for warning in warnings(series, measured)]
     else:

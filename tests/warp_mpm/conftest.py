@@ -20,6 +20,7 @@ class FlyingPoints:
     """
 
     START, PEAK_TIME, END, PEAK = 0.5, 0.8, 2.0, 4.0e5
+    nominal_step = 1e-3
 
     def __init__(self, scenario, device="cpu", fail_at=None):
         self.time, self.steps, self.device = 0.0, 0, device

@@ -20,6 +20,8 @@ from warp_mpm.results import ResultsError, Snapshots, read_time_series
 class Clock:
     """A simulation that only keeps time, with a number of points that falls."""
 
+    nominal_step = 0.01
+
     def __init__(self):
         self.time, self.barrier_displacement, self.visited = 0.0, 0.0, [0.0]
 

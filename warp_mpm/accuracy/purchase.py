@@ -303,7 +303,10 @@ class _Law:
                 self.values[name] = float(f[0])
                 self._seen[name] = np.maximum(np.maximum.accumulate(np.abs(f - f[0])), np.ptp(f[:3]))
         if not self.values:
-            raise PurchaseError("This scene has no barrier, so it has no figures whose accuracy could be bought.")
+            raise PurchaseError(
+                "In none of the probes did the flow reach a barrier, so there are no figures whose accuracy could be "
+                "bought; look at barrier, flow.velocity_m_per_s, the flow's distance and output.end_time_s."
+            )
         # Fine runs tell more of finer ones.
         exponent, self._constant = np.polyfit(np.log(h), np.log([rung.time * speed for rung in rungs]), 1, w=1.0 / h)
         self._exponent = float(exponent)

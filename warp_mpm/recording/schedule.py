@@ -1,10 +1,16 @@
-"""When recorders record: the simulation is stepped to land exactly on each recorder's times."""
+"""When recorders record: the simulation is stepped to land exactly on each recorder's times.
+
+Times that lie closer than a tenth of a nominal step (`time_step.SHORTEST_RECORD`) are one time: the first of them, or
+the end of the run where that is among them. No record therefore covers less.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
+
+from warp_mpm.time_step import SHORTEST_RECORD
 
 
 class Simulated(Protocol):
@@ -13,6 +19,10 @@ class Simulated(Protocol):
     @property
     def time(self) -> float:
         """Simulated time [s]."""
+
+    @property
+    def nominal_step(self) -> float:
+        """The step [s] against which times are told apart."""
 
     def advance(self, until: float) -> Any:
         """Step to exactly `until` [s]."""
@@ -38,11 +48,14 @@ class Schedule:
         """The time that comes next [s]."""
         return self.count * self.interval
 
-    def due(self, time: float) -> bool:
-        """Whether the next time has come, up to rounding; if so, move on to the one after."""
-        if self.next_time - time > 1e-6 * self.interval:
+    def due(self, time: float, slack: float = 0.0) -> bool:
+        """Whether the next time has come, up to rounding and to `slack` [s]; if so, move on to the first time for which
+        that does not hold."""
+        slack = max(slack, 1e-6 * self.interval)
+        if self.next_time - time > slack:
             return False
-        self.count += 1
+        while self.next_time - time <= slack:
+            self.count += 1
         return True
 
     def passed(self, time: float) -> bool:
@@ -88,22 +101,28 @@ def record_until(
     Returns:
         True when `end_time` was reached, False when stopped before.
     """
+    slack = SHORTEST_RECORD * simulation.nominal_step
+
+    def at_end() -> bool:
+        return end_time - simulation.time <= slack
+
     for recorder in recorders:
-        if recorder.schedule.due(simulation.time):
+        if recorder.schedule.due(simulation.time, slack):
             recorder.record(simulation)
-    ended = simulation.time >= end_time
+    ended = at_end()
     if after_records is not None and not ended:
         after_records(simulation, stopping=False)
     while not ended:
-        simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]))
+        until = min([end_time, *(recorder.schedule.next_time for recorder in recorders)])
+        simulation.advance(end_time if end_time - until <= slack else until)
         late = []
         for recorder in recorders:
-            if recorder.schedule.due(simulation.time):
+            if recorder.schedule.due(simulation.time, slack):
                 recorder.record(simulation)
             else:
                 late.append(recorder)
-        ended = simulation.time >= end_time or stop()
-        if after_records is not None and simulation.time < end_time:
+        ended = at_end() or stop()
+        if after_records is not None and not at_end():
             after_records(simulation, stopping=ended)
         if ended:
             # The end is recorded even where it is no multiple of the interval.
@@ -111,4 +130,4 @@ def record_until(
                 recorder.record(simulation)
         if on_step is not None:
             on_step(simulation)
-    return simulation.time >= end_time
+    return at_end()

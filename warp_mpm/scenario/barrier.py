@@ -81,7 +81,8 @@ class Trapezoid(Model):
 
 
 class Wall(Model):
-    """A vertical wall without end: the face is x = 0, y >= 0, and all of x > 0 is solid."""
+    """A vertical wall without end: the face is x = 0 at all heights above the ground, and below y = 0 too where there is
+    none; all of x > 0 is solid."""
 
     kind: Literal["wall"]
 
@@ -93,7 +94,9 @@ class Fixed(Model):
 
 
 class Sliding(Model):
-    """The barrier slides on its base with Coulomb friction, downstream only, and sticks when it comes to rest."""
+    """The barrier slides on its base with Coulomb friction, to either side, and sticks when it comes to rest. On level
+    ground the flow pushes it downstream; on a slope its own weight pulls too, upstream where the ground falls that
+    way."""
 
     kind: Literal["sliding"]
     density_kg_per_m3: Density | None = None

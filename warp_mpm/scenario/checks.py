@@ -37,6 +37,11 @@ def problems(scenario: Scenario) -> list[str]:
     barrier = scenario.barrier
     if scenario.ground is None and barrier is not None and isinstance(barrier.motion, Sliding):
         found.append("ground = null is not allowed with a sliding barrier, which needs a base to slide on")
+    elif scenario.ground is None and barrier is not None and isinstance(barrier.shape, Trapezoid):
+        found.append(
+            'ground = null is not allowed with barrier.shape of the kind "trapezoid", which has no underside and would '
+            'lift what flows beneath it; give a ground, or the kind "wall", which has no end below either'
+        )
     return found
 
 

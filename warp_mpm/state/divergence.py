@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..effects import Effects
 from ..kernels import layout as at
-from ..scenario import Numerics
+from ..scenario import Numerics, Scenario
 
 NAMES = {
     "velocity": "the velocity",
@@ -29,6 +29,27 @@ def diverging(effects: Effects) -> dict[str, str]:
     """Arrays of the material points in which a divergence shows, those of the law and of the scheme last."""
     own = {**effects.skeleton.point_fields, **effects.scheme.point_fields}
     return NAMES | {name: field.meaning for name, field in own.items() if field.meaning}
+
+
+def what_is_no_number(name: str, value: float, *, time: float, steps: int, scenario: Scenario) -> str:
+    """When, which quantity of a sample, and what to look at.
+
+    Args:
+        name: of the quantity, as in the time series.
+        value: infinite or no number.
+        time: simulated time [s].
+        steps: time steps so far.
+        scenario: what is run.
+    """
+    moduli = ["young_modulus_Pa", "liquid_bulk_modulus_Pa"]
+    material = scenario.flow.material
+    stiffness = " and ".join(
+        f"flow.material.{field} = {getattr(material, field):g}" for field in moduli if hasattr(material, field)
+    )
+    return (
+        f"The run diverged at t = {time:.6g} s (step {steps}): {name} is {value:g}. Look at {stiffness}, beside the "
+        "pressures that the flow's weight and speed make."
+    )
 
 
 def what_diverged(
