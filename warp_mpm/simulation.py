@@ -6,11 +6,12 @@ import math
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from functools import cache
-from typing import Any
+from functools import cache, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import warp as wp
@@ -33,11 +34,45 @@ from .time_step import step_limits
 __all__ = ["Simulation", "SimulationDiverged"]
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_WARP = threading.RLock()
+"""Held around what Warp does for one thread at a time: to start, to build and load kernels, and to capture, during
+which whatever another thread allocates or copies would be taken for part of the graph. Replaying a graph needs no
+lock on the CPU; on a GPU all threads share one stream, so that there everything waits for its turn."""
+
+
+def _one_thread_at_a_time(
+    method: Callable[Concatenate[Simulation, P], R],
+) -> Callable[Concatenate[Simulation, P], R]:
+    @wraps(method)
+    def alone(self: Simulation, *arguments: P.args, **named: P.kwargs) -> R:
+        with _WARP:
+            return method(self, *arguments, **named)
+
+    return alone
+
+
+def _one_thread_at_a_time_on_a_gpu(
+    method: Callable[Concatenate[Simulation, P], R],
+) -> Callable[Concatenate[Simulation, P], R]:
+    @wraps(method)
+    def alone(self: Simulation, *arguments: P.args, **named: P.kwargs) -> R:
+        if self.device.is_cpu:
+            return method(self, *arguments, **named)
+        with _WARP:
+            return method(self, *arguments, **named)
+
+    return alone
+
+
 @cache
 def _start_warp() -> None:
     """Start Warp without its banner, and without its warning that a machine has no GPU, which is no fault of anyone's.
 
-    Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on.
+    Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on, also
+    what another thread writes at the same time.
     """
     wp.config.log_level = wp.LOG_WARNING
     sys.stderr.flush()
@@ -64,6 +99,9 @@ class Simulation:
     >>> simulation.advance(until=1.0)
     >>> simulation.points()["pore_pressure"].max()
 
+    Threads may each make and run simulations of their own: making and preparing take turns, running goes on side by
+    side on the CPU. One simulation belongs to one thread at a time.
+
     Args:
         scenario: what to simulate.
         device: a Warp device, "cpu" or "cuda:0".
@@ -72,6 +110,7 @@ class Simulation:
         ValueError: the device does not exist.
     """
 
+    @_one_thread_at_a_time
     def __init__(self, scenario: Scenario, *, device: str = "cpu") -> None:
         self.scenario = scenario
         self.effects = derive_effects(scenario)
@@ -206,6 +245,7 @@ class Simulation:
             self._on_launch = None
             self._kernels_of_a_step = tuple(names[1:])  # the first one starts the interval
 
+    @_one_thread_at_a_time
     def _captured(self, launches: Callable[[], None]) -> Any:
         """A graph of the launches, which replays for a hundredth of what they cost one by one."""
         wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
@@ -231,6 +271,7 @@ class Simulation:
         """Share of the grid's blocks that held material in the last step; all that the grid costs is theirs."""
         return float(self._grid_arrays["active_count"].numpy()[0]) / self._grid_arrays["block"].size
 
+    @_one_thread_at_a_time_on_a_gpu
     def advance(self, until: float) -> None:
         """Run to the time `until` [s], exactly.
 
@@ -240,19 +281,20 @@ class Simulation:
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
-        self._target.fill_(until)
+        self._fill(self._target, until)
         self.prepare()
         wp.capture_launch(self._graph)
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
 
+    @_one_thread_at_a_time
     def kernel_times(self, until: float) -> dict[str, float]:
         """Run to the time `until` [s] with every kernel launched on its own, and tell the wall time [s] of each.
 
         Launches are prepared beforehand; what is left of their own cost, a few microseconds, is that of `forget`, which
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
-        self._target.fill_(until)
+        self._fill(self._target, until)
         self._commands = []
         self._start()
         self._step()
@@ -277,6 +319,7 @@ class Simulation:
             numerics=self.scenario.numerics,
         )
 
+    @_one_thread_at_a_time
     def set_points(self, **state: NDArray[np.float64]) -> None:
         """Replace part of the initial state; only before the first step.
 
@@ -314,9 +357,18 @@ class Simulation:
 
     # -- state -------------------------------------------------------------------------------------------------
 
+    @_one_thread_at_a_time_on_a_gpu
     def _read(self, name: str) -> NDArray[Any]:
         """Present numbers of the clock, the counters or the sums; on the CPU they go on changing with the run."""
         return self._seen[name] if name in self._seen else self._clock_arrays[name].numpy()
+
+    def _fill(self, array: Any, value: float) -> None:
+        """Set all of an array on the device; on the CPU behind Warp's back, which may be at work for another thread."""
+        if self.device.is_cpu:
+            array.numpy().fill(value)
+            return
+        with _WARP:
+            array.fill_(value)
 
     def _clock_entry(self, entry: int) -> float:
         return float(self._read("clock")[entry])
@@ -345,14 +397,15 @@ class Simulation:
         """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion."""
         if self.effects.barrier != "driven":
             raise ValueError("set_barrier_velocity needs a barrier whose motion is of the kind 'prescribed'")
-        self._velocities.fill_(float(velocity))
+        self._fill(self._velocities, float(velocity))
 
     def set_external_force(self, force: float) -> None:
         """Horizontal force [N/m] on a sliding barrier from now on, positive downstream."""
         if self.effects.barrier != "sliding":
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
-        self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1].fill_(float(force))
+        self._fill(self._clock[at.EXTERNAL_FORCE : at.EXTERNAL_FORCE + 1], float(force))
 
+    @_one_thread_at_a_time_on_a_gpu
     def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
         """State of the N material points still in the domain, as float64 arrays in SI units: all, or what is named.
 
@@ -397,6 +450,7 @@ class Simulation:
     def _totals(self) -> Totals:
         return Totals(self._read("clock").tolist(), self._read("reactions").tolist())
 
+    @_one_thread_at_a_time_on_a_gpu
     def sample(self) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval).
 
@@ -458,10 +512,12 @@ class Simulation:
         }
         return arrays
 
+    @_one_thread_at_a_time_on_a_gpu
     def save_state(self) -> bytes:
         """Everything that the run needs to go on, bit for bit (on the CPU)."""
         return saved.packed(self._state())
 
+    @_one_thread_at_a_time
     def restore_state(self, data: bytes) -> None:
         """Go back to a state from `save_state` of a simulation of the same scenario.
 
