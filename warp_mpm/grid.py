@@ -42,7 +42,7 @@ class GridLayout:
 
 @dataclass(frozen=True)
 class ContactNodes:
-    """Nodes through which the barrier acts, C of them."""
+    """Nodes through which the barrier acts, C of them; those of surfaces with friction come first."""
 
     node: NDArray[np.int32]
     """[C, 2]"""
@@ -135,6 +135,8 @@ def contact_nodes(barrier: Barrier, grid: GridLayout, depth_in_cells: float = 4.
     mirror[paired] = image[paired]
     friction = np.array([barrier.friction.face, barrier.friction.top, barrier.friction.back])
     surface = surfaces[plane]
+    order = np.argsort(friction[surface] == 0.0, kind="stable")
+    node, mirror, normal, surface = node[order], mirror[order], normal[order], surface[order]
     return ContactNodes(node, mirror, normal, surface, friction[surface])
 
 

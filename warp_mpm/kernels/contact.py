@@ -39,6 +39,8 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     LIQUID = effects.liquid
     FLIP = effects.transfer == "flip"
     FRICTION = effects.friction
+    BARRIER_FRICTION = effects.barrier_friction
+    GROUND_FRICTION = effects.ground == "frictional"
     BARRIER_CARRIED = effects.barrier_friction and LIQUID
     GROUND_CARRIED = effects.ground == "frictional" and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
@@ -132,6 +134,15 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
         return result > F(0.0)
 
     @wp.func
+    def rub(contact: Contact, e: wp.int32) -> F:
+        """Friction coefficient of a contact with the barrier; those that have one come first."""
+        result = F(0.0)
+        if BARRIER_FRICTION:
+            if e < contact.friction.shape[0]:
+                result = contact.friction[e]
+        return result
+
+    @wp.func
     def add(grid: Grid, i: wp.int32, j: wp.int32, change: V):
         grid.velocity[i, j] += change
         if FLIP:
@@ -195,7 +206,9 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
             time_step = F(clock[wp.static(TIME_STEP)])
             row = parameters.ground_row
             up = V2(F(0.0), F(1.0))
-            friction = parameters.ground_friction
+            friction = F(0.0)
+            if GROUND_FRICTION:
+                friction = parameters.ground_friction
             # The three rows that the ground concerns lie in one row of blocks.
             for s in range(worker, grid.active_count[0], parameters.workers):
                 block = grid.active[s]
@@ -304,7 +317,8 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 contact.pair[e] = pair
                 contact.velocity[e] = velocity
                 if BARRIER_CARRIED:
-                    contact.liquid_free[e] = liquid_free
+                    if e < contact.liquid_free.shape[0]:
+                        contact.liquid_free[e] = liquid_free
             contact.mass[e] = mass
 
         @wp.kernel(module=module)
@@ -324,13 +338,14 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 mirror = contact.mirror[e]
                 liquid_free = V2()
                 if BARRIER_CARRIED:
-                    liquid_free = contact.liquid_free[e]
+                    if e < contact.liquid_free.shape[0]:
+                        liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    contact.friction[e],
+                    rub(contact, e),
                     surface_velocity,
                     parameters,
                     time_step,
@@ -345,4 +360,4 @@ def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
         kernels["collect"] = collect
         kernels["barrier"] = barrier
 
-    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse)
+    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse, rub=rub)

@@ -241,6 +241,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
     if effects.ground != "none":
         parameters["ground_row"] = wp.int32  # first row of nodes above the ground
+    if effects.ground == "frictional":
         parameters["ground_friction"] = scalar
     if effects.side_walls:
         parameters["left_wall"] = scalar  # position [m]; far outside the grid: open
@@ -263,14 +264,16 @@ def layout(effects: Effects) -> SimpleNamespace:
         "mirror": array(dtype=wp.vec2i),  # (-1, -1): none
         "normal": array(dtype=V2),
         "surface": array(dtype=wp.int32),
-        "friction": array(dtype=scalar),
         # Gathered each step, for the barrier's equation of motion.
         "pair": array(dtype=wp.int32),  # 1: acts with its mirror image
         "mass": array(dtype=scalar),
         "velocity": array(dtype=V),
     }
-    if effects.barrier_friction and effects.liquid:
-        contact["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
+    if effects.barrier_friction:
+        # Of the first contacts, those whose surface rubs.
+        contact["friction"] = array(dtype=scalar)
+        if effects.liquid:
+            contact["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
 
     return SimpleNamespace(
         effects=effects,

@@ -41,6 +41,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     Parameters = types.Parameters
     respond = contact.respond
     impulse = contact.impulse
+    rub = contact.rub
     CARRIED = types.effects.barrier_friction and types.effects.liquid
     # Relative width of a bracket that cannot be closed any further, as impulses are rounded to the scalar's precision,
     # and of one in which the velocity counts as found.
@@ -57,13 +58,14 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
             if mass > F(0.0):
                 liquid_free = V2()
                 if CARRIED:
-                    liquid_free = contact.liquid_free[e]
+                    if e < contact.liquid_free.shape[0]:
+                        liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    contact.friction[e],
+                    rub(contact, e),
                     surface_velocity,
                     parameters,
                     time_step,

@@ -76,9 +76,11 @@ def contact_arrays(barrier: Barrier, types: SimpleNamespace, grid: GridLayout, *
         "mirror": nodes.mirror,
         "normal": nodes.normal,
         "surface": nodes.surface,
-        "friction": nodes.friction,
     }
     shapes = dict.fromkeys(types.contact_fields, len(nodes.node))
+    if "friction" in types.contact_fields:
+        given["friction"] = nodes.friction[nodes.friction > 0.0]
+        shapes["liquid_free"] = len(given["friction"])
     return _filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 

@@ -111,7 +111,9 @@ def _edges(scenario: Scenario, effects: Effects, grid: GridLayout) -> dict[str, 
     domain = scenario.domain
     values: dict[str, Any] = {}
     if scenario.ground is not None:
-        values |= {"ground_row": grid.ground_row, "ground_friction": scenario.ground.friction}
+        values["ground_row"] = grid.ground_row
+        if effects.ground == "frictional":
+            values["ground_friction"] = scenario.ground.friction
     if effects.ceiling:
         above = grid.rows - 4 if domain.top_m is None else round((domain.top_m - grid.bottom) / grid.spacing)
         values["ceiling_row"] = above - 1
