@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from warp_mpm.extent import domain_caveats
 from warp_mpm.scenario import Prescribed, Scenario
 from warp_mpm.simulator.laws import LAWS
 
@@ -43,7 +44,7 @@ def scene_caveats(scenario: Scenario) -> list[str]:
             f"The flow does not get to the barrier by t = {scenario.output.end_time_s:g} s; look at "
             "flow.velocity_m_per_s, the flow's distance, gravity.tilt_deg and output.end_time_s."
         )
-    return found
+    return [*found, *domain_caveats(scenario)]
 
 
 def _can_arrive(scenario: Scenario) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from warp_mpm.extent import Travel, barrier_travel, domain_extent
 from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
 
 
@@ -20,6 +21,18 @@ def described(scenario: Scenario) -> list[str]:
         f"{_barrier(scenario.barrier)}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
         f"{numerics.spacing_m:g} m grid, {numerics.precision}",
     ]
+
+
+def described_domain(scenario: Scenario) -> str:
+    """The domain in one line: its edges, given or fitted, and the speed that was reckoned with."""
+    extent, domain = domain_extent(scenario), scenario.domain
+    edges = extent.edges
+    bottom = "" if scenario.ground is not None else f"y = {edges.bottom:.4g} m, "
+    rides = ", riding with the barrier" if scenario.barrier is not None and barrier_travel(scenario) != Travel() else ""
+    words = f"domain from x = {edges.left:.4g} to {edges.right:.4g} m, {bottom}up to y = {edges.top:.4g} m{rides}"
+    if None in (domain.left_m, domain.right_m, domain.top_m):
+        words += f"; fitted to speeds up to {extent.speed:.3g} m/s"
+    return words
 
 
 def _barrier(barrier: Barrier | None) -> str:

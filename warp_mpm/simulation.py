@@ -6,11 +6,12 @@ import math
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import Any
+from functools import cache, wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import warp as wp
@@ -77,11 +78,45 @@ def _out_of_range(name: str, value: float, largest: float, unit: str) -> str:
     return f"{name} = {value!r} is not allowed; it must be a number from {-largest:g} to {largest:g} {unit}"
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_WARP = threading.RLock()
+"""Held around what Warp does for one thread at a time: to start, to build and load kernels, and to capture, during
+which whatever another thread allocates or copies would be taken for part of the graph. Replaying a graph needs no
+lock on the CPU; on a GPU all threads share one stream, so that there everything waits for its turn."""
+
+
+def _one_thread_at_a_time(
+    method: Callable[Concatenate[Simulation, P], R],
+) -> Callable[Concatenate[Simulation, P], R]:
+    @wraps(method)
+    def alone(self: Simulation, *arguments: P.args, **named: P.kwargs) -> R:
+        with _WARP:
+            return method(self, *arguments, **named)
+
+    return alone
+
+
+def _one_thread_at_a_time_on_a_gpu(
+    method: Callable[Concatenate[Simulation, P], R],
+) -> Callable[Concatenate[Simulation, P], R]:
+    @wraps(method)
+    def alone(self: Simulation, *arguments: P.args, **named: P.kwargs) -> R:
+        if self.device.is_cpu:
+            return method(self, *arguments, **named)
+        with _WARP:
+            return method(self, *arguments, **named)
+
+    return alone
+
+
 @cache
 def _start_warp() -> None:
     """Start Warp without its banner, and without its warning that a machine has no GPU, which is no fault of anyone's.
 
-    Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on.
+    Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on, also
+    what another thread writes at the same time.
     """
     wp.config.log_level = wp.LOG_WARNING
     sys.stderr.flush()
@@ -108,6 +143,9 @@ class Simulation:
     >>> simulation.advance(until=1.0)
     >>> simulation.points()["pore_pressure"].max()
 
+    Threads may each make and run simulations of their own: making and preparing take turns, running goes on side by
+    side on the CPU. One simulation belongs to one thread at a time.
+
     Args:
         scenario: what to simulate.
         device: a Warp device, "cpu" or "cuda:0".
@@ -117,6 +155,7 @@ class Simulation:
         ValueError: the device does not exist, or the bodies are no scene's: two of one name, flow inside one of them.
     """
 
+    @_one_thread_at_a_time
     def __init__(self, scenario: Scenario, *, device: str = "cpu", bodies: Sequence[Body] = ()) -> None:
         self.scenario = scenario
         self.grid = fit_grid(scenario, [body.outline.vertices for body in bodies])
@@ -237,6 +276,7 @@ class Simulation:
             self._on_launch = None
             self._kernels_of_a_step = tuple(names[1:])  # the first one starts the interval
 
+    @_one_thread_at_a_time
     def _captured(self, launches: Callable[[], None]) -> Any:
         """A graph of the launches, which replays for a hundredth of what they cost one by one."""
         wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
@@ -263,6 +303,7 @@ class Simulation:
         """Share of the grid's blocks that held material in the last step; all that the grid costs is theirs."""
         return float(self._grid_arrays["active_count"].numpy()[0]) / self._grid_arrays["block"].size
 
+    @_one_thread_at_a_time_on_a_gpu
     def advance(self, until: float) -> None:
         """Run to the time `until` [s], exactly.
 
@@ -276,20 +317,21 @@ class Simulation:
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
         self.prepare()
-        self._target.fill_(until)
+        self._fill(self._target, until)
         if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
             return
         wp.capture_launch(self._graph)
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
 
+    @_one_thread_at_a_time
     def kernel_times(self, until: float) -> dict[str, float]:
         """Run to the time `until` [s] with every kernel launched on its own, and tell the wall time [s] of each.
 
         Launches are prepared beforehand; what is left of their own cost, a few microseconds, is that of `forget`, which
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
-        self._target.fill_(until)
+        self._fill(self._target, until)
         self._commands = []
         self._start()
         self._step()
@@ -316,6 +358,7 @@ class Simulation:
             numerics=self.scenario.numerics,
         )
 
+    @_one_thread_at_a_time
     def set_points(self, **state: NDArray[np.float64]) -> None:
         """Replace part of the initial state; only before the first step.
 
@@ -353,11 +396,20 @@ class Simulation:
 
     # -- state -------------------------------------------------------------------------------------------------
 
+    @_one_thread_at_a_time_on_a_gpu
     def _read(self, name: str) -> NDArray[Any]:
         """Present numbers of clock, bodies, counters or sums; on the CPU they go on changing with the run."""
         if name in self._seen:
             return self._seen[name]
         return (self._body_arrays if name in self._body_arrays else self._clock_arrays)[name].numpy()
+
+    def _fill(self, array: Any, value: float | tuple[float, float]) -> None:
+        """Set all of an array on the device; on the CPU behind Warp's back, which may be at work for another thread."""
+        if self.device.is_cpu:
+            array.numpy()[...] = value
+            return
+        with _WARP:
+            array.fill_(value)
 
     def _clock_entry(self, entry: int) -> float:
         return float(self._read("clock")[entry])
@@ -422,7 +474,7 @@ class Simulation:
         if not abs(velocity) <= LARGEST_VELOCITY:
             raise ValueError(_out_of_range("velocity", velocity, LARGEST_VELOCITY, "m/s"))
         first, last = self._body_arrays["first_time"].numpy()[self._barrier : self._barrier + 2]
-        self._body_arrays["velocities"][first:last].fill_(wp.vec2d(float(velocity), 0.0))
+        self._fill(self._body_arrays["velocities"][first:last], (float(velocity), 0.0))
 
     def set_external_force(self, force: float) -> None:
         """Horizontal force [N/m] on a sliding barrier from now on, positive downstream.
@@ -434,8 +486,9 @@ class Simulation:
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
         if not abs(force) <= LARGEST_FORCE:
             raise ValueError(_out_of_range("force", force, LARGEST_FORCE, "N/m"))
-        self._body_arrays["external_force"][self._barrier : self._barrier + 1].fill_(float(force))
+        self._fill(self._body_arrays["external_force"][self._barrier : self._barrier + 1], float(force))
 
+    @_one_thread_at_a_time_on_a_gpu
     def points(self, names: Collection[str] | None = None) -> dict[str, NDArray[np.float64]]:
         """State of the N material points still in the domain, as float64 arrays in SI units: all, or what is named.
 
@@ -484,6 +537,7 @@ class Simulation:
         base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
         return Totals(self.time, self._read("reactions").tolist(), base_impulse)
 
+    @_one_thread_at_a_time_on_a_gpu
     def sample(self) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval); where no
         step has been made since, the forces of that sample.
@@ -569,10 +623,12 @@ class Simulation:
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
         return arrays
 
+    @_one_thread_at_a_time_on_a_gpu
     def save_state(self) -> bytes:
         """Everything that the run needs to go on, bit for bit (on the CPU)."""
         return saved.packed(self._state())
 
+    @_one_thread_at_a_time
     def restore_state(self, data: bytes) -> None:
         """Go back to a state from `save_state` of a simulation of the same scenario.
 

@@ -126,6 +126,66 @@ def test_generated_code_of_a_fixed_barrier_does_not_slide(load_scene):
     assert "barrier_mass" in generated_code(load_scene("case_1", **changes))
 
 
+FRICTION_WORDS = ("friction", "liquid_alone", "liquid_free")
+
+
+def friction_in(scenario):
+    """Arrays with their bytes, and kernel parameters, that have to do with the friction of surfaces."""
+    simulation = Simulation(scenario)
+    fields = simulation._types.Parameters.vars
+    arrays = {name: size for name, size in simulation.arrays.items() if any(word in name for word in FRICTION_WORDS)}
+    return arrays, {name for name in fields if any(word in name for word in FRICTION_WORDS)}
+
+
+BASE = {"bodies.base_friction"}
+"""That of the barrier's own base on the soil is another."""
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_1_fixed", "case_1_dry", "case_1_undrained"])
+def test_without_friction_nothing_of_it_is_there(load_scene, name):
+    changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01, "barrier.friction": 0.0}
+    smooth = load_scene(name, **changes)
+    arrays, parameters = friction_in(smooth)
+    assert set(arrays) == (BASE if smooth.barrier.motion.kind == "sliding" else set())
+    assert parameters == set()
+    words = set(re.findall(r"[A-Za-z_]\w*", generated_code(smooth)))
+    found = {word.replace("adj_", "var_") for word in words if any(part in word for part in FRICTION_WORDS)}
+    # Arguments that one function hands on, and what the barrier's base does.
+    assert found <= {"var_friction", "var_liquid_free", "base_friction", "var_base_friction"}
+    assert {"contact", "grid", "bodies"} <= {name.partition(".")[0] for name in friction_in(load_scene("case_1"))[0]}
+
+
+def test_friction_of_the_ground_alone(load_scene):
+    changes = {"numerics.spacing_m": 0.5, "ground.friction": 0.3, "barrier.friction": 0.0}
+    arrays, _ = friction_in(load_scene("case_1_fixed", **changes))
+    assert set(arrays) == {"grid.liquid_alone", "bodies.friction"}
+    dry, _ = friction_in(load_scene("case_1_dry", **changes))
+    assert set(dry) == {"bodies.friction"} | BASE
+
+
+def test_one_surface_pays_for_itself_alone(load_scene):
+    """Friction on one surface of the barrier holds vectors at that surface's contacts, and at no others."""
+
+    def contacts(face, top, back):
+        friction = {"face": face, "top": top, "back": back}
+        scenario = load_scene("case_1", **{"numerics.spacing_m": 0.5, "barrier.friction": friction})
+        return friction_in(scenario)[0]["contact.barrier.liquid_free"] // 16
+
+    every = contacts(0.3, 0.3, 0.3)
+    single = [contacts(0.3, 0, 0), contacts(0, 0.3, 0), contacts(0, 0, 0.3)]
+    assert sum(single) == every
+    assert all(0 < number < every for number in single)
+
+
+def test_the_order_of_the_contacts_does_not_matter(load_scene):
+    """Contacts that rub come first; next to no friction on the face puts all in the order of the grid again."""
+    scenes = [
+        load_scene("case_1", **COARSE | {"barrier.friction": {"face": face, "top": 0.3, "back": 0.3}})
+        for face in (0.0, 1e-13)
+    ]
+    assert_equal_runs(forces_and_positions(scenes[1]), forces_and_positions(scenes[0]), 1e-9)
+
+
 def test_a_domain_ten_times_as_large_holds_no_more_blocks_in_use(load_scene):
     counts = []
     for scale in (1.0, 10.0):

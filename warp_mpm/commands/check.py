@@ -15,7 +15,7 @@ def check(
 ) -> None:
     """Check scenario files and tell what they describe; nothing is run or written."""
     from warp_mpm.caveats import scene_caveats
-    from warp_mpm.description import described
+    from warp_mpm.description import described, described_domain
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
@@ -24,7 +24,9 @@ def check(
         try:
             scenario = Scenario.load(file)
             notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
-            typer.echo("\n  ".join([f"{file}: {scenario.title}", *described(scenario), *notes]))
+            typer.echo(
+                "\n  ".join([f"{file}: {scenario.title}", *described(scenario), described_domain(scenario), *notes])
+            )
         except ScenarioError as error:
             failed = True
             complain(str(error))

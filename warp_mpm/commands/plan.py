@@ -41,6 +41,7 @@ def plan(
 
     with refusals():
         from warp_mpm.caveats import scene_caveats
+        from warp_mpm.description import described_domain
         from warp_mpm.performance.plan import make_plan
         from warp_mpm.performance.plan import what_if as switched
         from warp_mpm.scenario import Scenario
@@ -63,6 +64,7 @@ def plan(
         typer.echo(json.dumps(told | {"what_if": [asdict(switch) for switch in switches]}, indent=2))
         return
     console.print(scenario.title, style="bold")
+    console.print(described_domain(scenario), soft_wrap=True)
     for sentence in scene_caveats(scenario):
         console.print(f"Note: {sentence}", soft_wrap=True)
     _print_effects(console, card)

@@ -239,7 +239,8 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
                 contact.pair[e] = pair
                 contact.velocity[e] = velocity
                 if CARRIED:
-                    contact.liquid_free[e] = liquid_free
+                    if e < contact.liquid_free.shape[0]:
+                        contact.liquid_free[e] = liquid_free
             contact.mass[e] = mass
 
         @wp.kernel(module=module)
@@ -261,7 +262,8 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
                 surface = contact.surface[e]
                 liquid_free = V2()
                 if CARRIED:
-                    liquid_free = contact.liquid_free[e]
+                    if e < contact.liquid_free.shape[0]:
+                        liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],

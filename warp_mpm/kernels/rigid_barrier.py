@@ -50,7 +50,8 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
             if mass > F(0.0):
                 liquid_free = V2()
                 if CARRIED:
-                    liquid_free = contact.liquid_free[e]
+                    if e < contact.liquid_free.shape[0]:
+                        liquid_free = contact.liquid_free[e]
                 change = respond(
                     mass,
                     contact.velocity[e],

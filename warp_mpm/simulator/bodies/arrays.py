@@ -153,6 +153,14 @@ def contact_arrays(
         }
         given = {"body": number} | found
         shapes = dict.fromkeys(types.contact_fields, found["places"])
+        if not passing and isinstance(body.motion, Sliding):
+            # Those that rub come first: what the liquid would do alone is kept for them and no others.
+            friction = np.array([surface.friction for surface in body.surfaces])
+            rubs = friction[found["surface"] - first[number]] > 0.0
+            order = np.argsort(~rubs, kind="stable")
+            given |= {name: found[name][order] for name in ("node", "mirror", "normal", "surface")}
+            given |= {"block": np.array([-1], dtype=np.int32), "start": np.array([0, len(order)], dtype=np.int32)}
+            shapes["liquid_free"] = int(rubs.sum())
         groups.append(filled(types.Contact(), fields, given, shapes, device))
     return groups
 
