@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
 from warp_mpm.extent import domain_caveats
-from warp_mpm.scenario import Prescribed, Scenario
+from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
 from warp_mpm.simulator.laws import LAWS
+
+Key = TypeVar("Key")
 
 LEAST_CELLS = 4.0
 """Cells over the flow's depth below which even peak forces were a tenth off (case 1 at 3.75: 11 %)."""
 
 WATER = 1000.0
 """Density [kg/m³] that no rock falls short of."""
+
+GREATEST_FRICTION = 2.0
+"""Friction coefficient, that is 63°, above which no rock rubs on another."""
+
+GREATEST_STRAIN = 0.1
+"""Compression at rest by the flow's own weight above which a modulus looks like a slip."""
 
 BOUNDS = {
     "float64": {"mass_error": 1e-9, "momentum_error": 1e-6, "energy_error": 0.02},
@@ -38,26 +46,91 @@ def scene_caveats(scenario: Scenario) -> list[str]:
     if grains < WATER:
         found.append(f"flow.material.grain_density_kg_per_m3 = {grains:g} is lighter than water; rock has about 2650.")
     found += LAWS.named(flow.material.law).caveats(flow.material)
-    driven = scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed)
-    if scenario.barrier is not None and not driven and not _can_arrive(scenario):
+    found += [*_unlikely_friction(scenario), *_impossible_start(scenario)]
+    if scenario.barrier is not None and not _can_arrive(scenario):
+        driven = isinstance(scenario.barrier.motion, Prescribed)
         found.append(
             f"The flow does not get to the barrier by t = {scenario.output.end_time_s:g} s; look at "
-            "flow.velocity_m_per_s, the flow's distance, gravity.tilt_deg and output.end_time_s."
+            "flow.velocity_m_per_s, the flow's distance, "
+            + ("barrier.motion.velocities_m_per_s, " if driven else "")
+            + "gravity.tilt_deg and output.end_time_s."
         )
     return [*found, *domain_caveats(scenario)]
 
 
+def _unlikely_friction(scenario: Scenario) -> list[str]:
+    """Surfaces that are rougher than any."""
+    given: dict[str, float | None] = {"ground.friction": scenario.ground.friction if scenario.ground else None}
+    if scenario.barrier is not None:
+        rubbing = scenario.barrier.friction
+        given |= {f"barrier.friction.{name}": getattr(rubbing, name) for name in ("face", "top", "back")}
+        if isinstance(scenario.barrier.motion, Sliding):
+            given["barrier.motion.base_friction"] = scenario.barrier.motion.base_friction_coefficient
+    high = {name: value for name, value in given.items() if value is not None and value > GREATEST_FRICTION}
+    if not high:
+        return []
+    told = ", ".join(f"{name} = {value:g}" for name, value in high.items())
+    angle = math.degrees(math.atan(max(high.values())))
+    return [f"{told}: a friction coefficient above {GREATEST_FRICTION:g}, up to {angle:.0f}°; rock has about 0.6."]
+
+
+def _impossible_start(scenario: Scenario) -> list[str]:
+    """What the initial stress asks of the material that it cannot bear."""
+    flow, material = scenario.flow, scenario.flow.material
+    if flow.initial_stress != "geostatic":
+        return []
+    found = []
+    liquid = material.liquid_density_kg_per_m3 if isinstance(material, UndrainedMaterial) else 0.0
+    head = -scenario.gravity.vector[1] * flow.depth
+    vertical = (material.density - liquid) * head  # at the base, compression positive
+    for field, modulus, pressure, what in (
+        ("young_modulus_Pa", material.oedometric_modulus, abs(vertical), "effective stress"),
+        ("liquid_bulk_modulus_Pa", getattr(material, "liquid_bulk_modulus_Pa", math.inf), liquid * head, "pressure"),
+    ):
+        if pressure > GREATEST_STRAIN * modulus:
+            found.append(
+                f"flow.material.{field} = {getattr(material, field):g} is too soft for the {what} of "
+                f"{pressure / 1e3:.3g} kPa under the flow, which compresses it by more than {GREATEST_STRAIN:.0%} at "
+                "rest."
+            )
+    law = LAWS.named(material.law)
+    if vertical < 0.0:
+        if law.opens:
+            found.append(
+                f"The mixture, {material.density:g} kg/m³, is lighter than its liquid "
+                "(flow.material.liquid_density_kg_per_m3 = "
+                f"{liquid:g}): the skeleton starts in tension, outside the yield surface, and the first step changes it."
+            )
+        return found
+    least, most = law.lateral_stress_range(material, vertical)
+    if not least * (1.0 - 1e-9) <= flow.lateral_stress_ratio <= most * (1.0 + 1e-9):
+        found.append(
+            f"The initial stress lies outside the yield surface: flow.lateral_stress_coefficient = "
+            f"{flow.lateral_stress_ratio:g}, where the law {law.name} bears {least:.3g} to {most:.3g}; the first step "
+            "changes it."
+        )
+    return found
+
+
 def _can_arrive(scenario: Scenario) -> bool:
-    """No front is faster than one that slides without friction and spreads as a dam break does, 2 √(g h) ahead."""
+    """No front is faster than one that slides without friction and spreads as a dam break does, 2 √(g h) ahead. A
+    driven barrier comes to meet it, or flees."""
     flow, end = scenario.flow, scenario.output.end_time_s
     acceleration, _ = scenario.gravity.vector
     x, y = flow.polygon.T
     along, across = flow.velocity_m_per_s
     speed = along + abs(across) + 2.0 * math.sqrt(scenario.gravity.acceleration_m_per_s2 * float(np.ptp([0.0, *y])))
     # Where gravity holds it back, a front is farthest before the end.
-    farthest = min(speed / -acceleration, end) if speed > 0.0 > acceleration else end
-    reach = speed * farthest + 0.5 * acceleration * farthest**2
-    return float(x.max()) + max(reach, 0.0) >= -scenario.numerics.spacing_m  # the face starts at x = 0
+    farthest = speed / -acceleration if speed > 0.0 > acceleration else math.inf
+    time = np.linspace(0.0, end, 401)
+    going = np.minimum(time, farthest)
+    front = float(x.max()) + speed * going + 0.5 * acceleration * going**2
+    face = np.zeros(len(time))  # where it starts
+    motion = scenario.barrier.motion if scenario.barrier is not None else None
+    if isinstance(motion, Prescribed):
+        velocity = np.interp(time, motion.times_s, motion.velocities_m_per_s)
+        face[1:] = np.cumsum(0.5 * (velocity[1:] + velocity[:-1])) * (end / (len(time) - 1))
+    return bool((front >= face - scenario.numerics.spacing_m).any())
 
 
 def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[str]:
@@ -82,6 +155,9 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
             found.append(f"{name} = {value:.2g} is above {bound:g}.")
     if summary.get("peak_force") == 0.0:
         found.append("The flow did not touch the barrier.")
+    displacement = summary.get("barrier_displacement_final")
+    if summary.get("barrier_at_rest") is not None and displacement is not None and displacement < 0.0:
+        found.append(f"The barrier slid upstream, by {-displacement:.3g} m: displacement and velocity are negative.")
     if summary.get("barrier_at_rest") is False:
         found.append(
             f"The barrier still slides at {summary['barrier_velocity_final']:.3g} m/s at the end of the run: its "
@@ -98,6 +174,15 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
             "are those so far."
         )
     return found
+
+
+def told_of(notes: Mapping[Key, Sequence[str]]) -> list[tuple[str, list[Key]]]:
+    """Each sentence once, with all of which it is told."""
+    found: dict[str, list[Key]] = {}
+    for name, sentences in notes.items():
+        for sentence in sentences:
+            found.setdefault(sentence, []).append(name)
+    return list(found.items())
 
 
 def impact_goes_on(summary: Mapping[str, Any]) -> bool:

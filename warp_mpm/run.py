@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.recording import (
     Checkpointer,
     Recorder,
@@ -250,6 +251,7 @@ def evaluate(path: Path) -> dict[str, Any]:
     with results.snapshots as snapshots:
         of_the_run = {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
         summary = summarize(results.scenario, results.time_series, snapshots, of_the_run)
+        summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
         with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw

@@ -57,6 +57,7 @@ DEFINITIONS = {
     "on_crest_volume": "material above the crest at the end",
     "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",
     "mechanism": mechanism.RULE,
+    "notes": "what must be known before the scene and its figures are trusted",
     "mass_error": "greatest change of the mass of both phases, inside and departed together, over the initial mass",
     "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
     "momentum and the impulse of its weight",

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from warp_mpm.hard_cases.measure import measure
 from warp_mpm.simulation import Simulation
 
 SLAB = {"kind": "polygon", "vertices_m": [[-30, 0], [-6, 0], [-6, 1], [-30, 1]]}
@@ -160,3 +161,18 @@ def test_sliding_does_not_hang_on_where_the_crest_lies_among_the_nodes(load_scen
         simulation.advance(6.0)
         slid.append(simulation.barrier_displacement)
     assert slid[1] == pytest.approx(slid[0], rel=0.03)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 40.0])
+def test_a_wall_without_ground_goes_on_below(load_scene, tilt):
+    """It ended three cells below y = 0, where points were then set back, at 40° with 2 % and, finer, 8 % of energy from
+    nowhere."""
+    changes = {"barrier.shape": {"kind": "wall"}, "barrier.motion": {"kind": "fixed"}, "ground": None}
+    changes |= {"gravity.tilt_deg": tilt, "output.time_series_interval_s": 0.02}
+    scenario = scene(load_scene, **changes, **{"output.end_time_s": 1.5})
+    measured = measure(scenario)
+    assert measured.failures(scenario) == []
+    assert measured.figures["pushed_share"] == 0.0
+    assert measured.figures["energy_error"] < 1e-3
+    assert measured.last.position[:, 1].min() < -5.0
+    assert measured.figures["peak_force_filtered"] > 1e5

@@ -1,8 +1,13 @@
 """A run that leaves the range of sense is noticed within one output interval, and says when, where and what."""
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from warp_mpm.cli import app
+from warp_mpm.hard_cases.measure import measure
 from warp_mpm.simulation import Simulation, SimulationDiverged
 
 
@@ -97,3 +102,33 @@ def test_a_spoilt_state_changes_nothing(simulation, spoilt):
     with pytest.raises(ValueError, match=r"the state (is damaged|does not fit this scenario)"):
         simulation.restore_state(spoilt(state))
     assert simulation.save_state() == state
+
+
+def test_an_energy_without_end_stops_the_run(load_scene, tmp_path):
+    """A liquid of 1 Pa under 29 kPa holds exp(15,000) of energy: no number, and no energy that was "lost"."""
+    scenario = load_scene("case_1", **{"numerics.spacing_m": 0.75, "flow.material.liquid_bulk_modulus_Pa": 1.0})
+    words = r"diverged at t = 0 s \(step 0\): flow_elastic_energy is inf\. Look at .*liquid_bulk_modulus_Pa = 1, beside"
+    with pytest.raises(SimulationDiverged, match=words):
+        Simulation(scenario).sample()
+    path = tmp_path / "soft.json"
+    path.write_text(json.dumps(scenario.resolved()))
+    result = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "run")])
+    assert result.exit_code == 3
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"] == "failed"
+    measured = measure(scenario)
+    assert [criterion.figure for criterion, _ in measured.failures(scenario)] == ["diverged"]
+
+
+def test_a_hard_case_that_does_not_bear_half_the_time_step_fails(coarse_case_1):
+    """Its figures are those up to where it ended, which may well be alike."""
+    scenario = coarse_case_1.replaced({"numerics.spacing_m": 0.75, "output.end_time_s": 0.6})
+
+    class Brittle(Simulation):
+        def advance(self, until):
+            if self.scenario.numerics.courant_number < 0.5 and until > 0.5:
+                raise SimulationDiverged("It broke.")
+            super().advance(until)
+
+    measured = measure(scenario, halve=True, make_simulation=Brittle)
+    failed = [criterion.figure for criterion, _ in measured.failures(scenario)]
+    assert {"halving_peak_force", "halving_displacement"} <= set(failed)

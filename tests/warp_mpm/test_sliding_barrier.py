@@ -121,3 +121,32 @@ def test_what_base_friction_holds_is_a_fixed_barrier(load_scene):
         simulation.advance(1.0)
     assert held.barrier_displacement == 0.0
     np.testing.assert_allclose(held.points()["position"], fixed.points()["position"], atol=1e-10)
+
+
+@pytest.mark.parametrize("force", [float("nan"), float("inf"), -float("inf"), 1e300, -1.1e15])
+def test_a_force_that_is_none_is_refused(load_scene, force):
+    """A spring law that divides 0 by 0 would hold the barrier still, in silence."""
+    simulation = Simulation(scene(load_scene))
+    with pytest.raises(ValueError, match=r"force = \S+ is not allowed; it must be a number from -1e\+15 to 1e\+15 N/m"):
+        simulation.set_external_force(force)
+    simulation.set_external_force(np.float32(1e5))
+    simulation.advance(0.01)
+    assert np.isfinite(simulation.sample()["base_force"])
+
+
+@pytest.mark.parametrize("velocity", [float("nan"), float("inf"), 1e300, -10_001.0])
+def test_a_velocity_that_is_none_is_refused(load_scene, velocity):
+    driven = {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [0.0]}
+    simulation = Simulation(load_scene("case_1", **{"numerics.spacing_m": 0.75, "barrier.motion": driven}))
+    with pytest.raises(ValueError, match=r"velocity = \S+ is not allowed; it must be a number from -10000 to 10000 m"):
+        simulation.set_barrier_velocity(velocity)
+
+
+def test_on_a_slope_that_falls_upstream_its_weight_pulls_it_there(load_scene):
+    """Far from the flow, with a = g (sin theta - tan delta cos theta)."""
+    changes = {"gravity.tilt_deg": -30.0, "flow.shape.distance_m": 60.0, "flow.velocity_m_per_s": [0.0, 0.0]}
+    simulation = Simulation(scene(load_scene, motion={"mass_kg_per_m": 9e4, "base_friction": 0.29}, **changes))
+    simulation.advance(0.2)
+    pull = 9.81 * (np.sin(np.radians(30.0)) - 0.29 * np.cos(np.radians(30.0)))
+    assert simulation.barrier_velocity == pytest.approx(-0.2 * pull, rel=1e-9)
+    assert simulation.barrier_displacement == pytest.approx(-0.02 * pull, rel=1e-9)

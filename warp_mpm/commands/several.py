@@ -114,6 +114,7 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from warp_mpm.caveats import told_of
     from warp_mpm.terminal import AT_LEAST, sliding_distance
 
     console = Console(highlight=False, markup=False)
@@ -141,3 +142,5 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
     console.print(table)
     if any(summary.get("barrier_at_rest") is False for summary in summaries.values()):
         console.print(AT_LEAST)
+    for sentence, folders in told_of({folder: summary.get("notes", []) for folder, summary in summaries.items()}):
+        console.print(f"Note, {', '.join(folders)}: {sentence}", soft_wrap=True)

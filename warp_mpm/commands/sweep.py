@@ -23,6 +23,10 @@ SHOWN = {
 """Key figures of the table on the terminal, with headings and factors from SI; the Parquet file has all."""
 
 
+MOST_NAMED = 20
+"""Cases that a note under the table names."""
+
+
 def sweep(
     sweep_file: Annotated[Path, typer.Argument(metavar="SWEEP", help="Sweep file (JSON).", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="Folder of the sweep.", show_default="runs/NAME of the file")] = None,
@@ -41,6 +45,7 @@ def sweep(
     interrupted.
     """
     with refusals():
+        from warp_mpm.caveats import scene_caveats
         from warp_mpm.scenario import Scenario
         from warp_mpm.sweep import Sweep, run_sweep
 
@@ -80,17 +85,18 @@ def sweep(
         if as_json:
             typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
         else:
-            _print(rows, list(plan.vary))
+            _print(rows, list(plan.vary), {case.number: scene_caveats(case.scenario) for case in plan.cases(base)})
         typer.echo(f"Table: {folder / 'results.parquet'}", err=True)
         if any(row["status"] != "finished" for row in rows):
             raise typer.Exit(CASE_FAILED)
 
 
-def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
+def _print(rows: list[dict[str, Any]], varied: list[str], notes: dict[int, list[str]]) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
+    from warp_mpm.caveats import told_of
     from warp_mpm.terminal import AT_LEAST, sliding_distance
 
     console = Console(highlight=False, markup=False)
@@ -108,6 +114,10 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
     console.print(table)
     if any(row.get("barrier_at_rest") is False for row in rows):
         console.print(AT_LEAST)
+    for sentence, cases in told_of(notes):
+        of = "all cases" if len(cases) == len(rows) else f"case {cases[0]}" if len(cases) == 1 else None
+        of = of or f"cases {', '.join(map(str, cases[:MOST_NAMED]))}" + ", …" * (len(cases) > MOST_NAMED)
+        console.print(f"Note, {of}: {sentence}", soft_wrap=True)
 
 
 def _leaf(path: str) -> str:

@@ -26,6 +26,9 @@ TWIN_POINTS = 700
 TWIN_SECONDS = 2.0
 """Time after which the twin is stopped; its last speed and cost then hold for the rest."""
 
+TIMED_RECORDS = 5
+"""Samples, and snapshots, of which the time is taken."""
+
 TWIN_STRETCHES = 200
 """Stretches of the twin's run."""
 

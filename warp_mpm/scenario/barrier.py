@@ -81,8 +81,8 @@ class Trapezoid(Model):
 
 
 class Wall(Model):
-    """A vertical wall without end: the face is x = 0 at all heights above the ground, and below y = 0 too where there is
-    none; all of x > 0 is solid."""
+    """A vertical wall without end: the face is x = 0 at all heights above the ground, or at all where there is no
+    ground; all of x > 0 is solid."""
 
     kind: Literal["wall"]
 

@@ -64,6 +64,15 @@ class Law:
         """Horizontal over vertical effective stress at rest, K0 [-]; by default that of an elastic layer."""
         return material.poisson_ratio / (1.0 - material.poisson_ratio)
 
+    def lateral_stress_range(self, material: Any, vertical: float) -> tuple[float, float]:
+        """Least and greatest ratio of horizontal to vertical effective stress [-] that the law allows at rest.
+
+        Args:
+            material: of the scenario.
+            vertical: effective stress, compression positive, at least 0 [Pa].
+        """
+        return 0.0, math.inf
+
     def caveats(self, material: Any) -> list[str]:
         """What looks like a slip in the material's figures; one sentence each."""
         return []

@@ -75,6 +75,15 @@ class MohrCoulomb(Law):
         """Jaky's 1 - sin φ'."""
         return 1.0 - math.sin(math.radians(material.friction_angle_deg))
 
+    def lateral_stress_range(self, material: Any, vertical: float) -> tuple[float, float]:
+        """Active and passive coefficients of Rankine, with cohesion."""
+        if vertical == 0.0:
+            return 0.0, math.inf
+        sine = math.sin(math.radians(material.friction_angle_deg))
+        cohesion = 2.0 * material.cohesion_Pa * math.cos(math.radians(material.friction_angle_deg))
+        least = max(((1.0 - sine) * vertical - cohesion) / ((1.0 + sine) * vertical), 0.0)
+        return least, ((1.0 + sine) * vertical + cohesion) / ((1.0 - sine) * vertical)
+
     def strength(self, material: Any) -> float:
         return material.cohesion_Pa
 
