@@ -99,7 +99,8 @@ def _impossible_start(scenario: Scenario) -> list[str]:
             found.append(
                 f"The mixture, {material.density:g} kg/m³, is lighter than its liquid "
                 "(flow.material.liquid_density_kg_per_m3 = "
-                f"{liquid:g}): the skeleton starts in tension, outside the yield surface, and the first step changes it."
+                f"{liquid:g}): the skeleton starts in tension, outside the yield surface, and the first step changes "
+                "it."
             )
         return found
     least, most = law.lateral_stress_range(material, vertical)
