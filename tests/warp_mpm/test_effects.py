@@ -17,7 +17,7 @@ SCENES = Path(__file__).parents[2] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENES.glob("*.json"))
 
 TRANSPORT = ["clear", "forget", "scatter", "move"]
-BARRIERS = {"sliding": ["collect", "slide", "barrier"], "fixed": ["collect", "barrier"]}
+BARRIERS = {"sliding": ["collect", "slide", "push"], "fixed": ["press"]}
 
 POINT_NUMBERS = {
     "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
@@ -68,10 +68,11 @@ def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
     simulation = Simulation(scenario)
     simulation.advance(1e-4)
     # The shipped scenes are plastic, on smooth ground, with smoothing; they differ in flow and barrier.
-    step = [*TRANSPORT, "ground", *BARRIERS[scenario.barrier.motion.kind], "gather", "average", "advect"]
-    step += ["update", "bound"]
-    assert noted["launched"] == ["start", *step, "tick"]
-    assert simulation.launched_kernels == (*step, "tick")
+    ground, barrier = ["press"], BARRIERS[scenario.barrier.motion.kind]
+    points = ["gather", "average", "advect", "update", "bound", "tick"]
+    assert noted["launched"] == ["start", *TRANSPORT, *ground, *barrier, *points]
+    contact = [*(f"{name} ground" for name in ground), *(f"{name} barrier" for name in barrier)]
+    assert simulation.launched_kernels == (*TRANSPORT, *contact, *points)
 
     arrays, number = simulation.arrays, simulation.material_points
     for field, count in POINT_NUMBERS[flow.formulation].items():
@@ -122,8 +123,11 @@ def test_generated_code_of_a_dry_scene_holds_no_liquid(load_scene):
 
 def test_generated_code_of_a_fixed_barrier_does_not_slide(load_scene):
     changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01}
-    assert "barrier_mass" not in generated_code(load_scene("case_1_fixed", **changes))
-    assert "barrier_mass" in generated_code(load_scene("case_1", **changes))
+    fixed = generated_code(load_scene("case_1_fixed", **changes))
+    sliding = generated_code(load_scene("case_1", **changes))
+    for field in ("base_friction", "old_velocity", "displacement"):
+        assert field not in fixed
+        assert field in sliding
 
 
 FRICTION_WORDS = ("friction", "liquid_alone", "liquid_free")
@@ -242,7 +246,11 @@ WITHOUT_INFLUENCE = {
         {"domain.left_edge": "wall", "domain.right_edge": "wall", "domain.top_edge": "wall"},
         {},
     ),
-    "ground friction of next to nothing": ("case_1", {"ground.friction": 1e-13}, {}),
+    "ground friction of next to nothing": (
+        "case_1",
+        {"barrier.friction": 0.0, "ground.friction": 1e-13},
+        {"barrier.friction": 0.0},
+    ),
 }
 
 

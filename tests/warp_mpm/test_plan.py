@@ -68,19 +68,19 @@ def test_what_if_switches_one_effect_at_a_time(load_scene, monkeypatch):
     """Only two effects here, each of which costs a compilation."""
     from warp_mpm.performance import plan
 
-    rules = [rule for rule in plan.effect_rules(load_scene("case_1")) if rule.effect in ("barrier", "drag")]
+    rules = [rule for rule in plan.effect_rules(load_scene("case_1")) if rule.effect in ("sliding", "drag")]
     of_scene = plan.effect_rules
     monkeypatch.setattr(
-        plan, "effect_rules", lambda scenario: [r for r in of_scene(scenario) if r.effect in ("barrier", "drag")]
+        plan, "effect_rules", lambda scenario: [r for r in of_scene(scenario) if r.effect in ("sliding", "drag")]
     )
     assert len(rules) == 2
     scene = load_scene("case_1", **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.5})
-    base, drag, barrier = what_if(scene)
-    assert (base.effect, drag.effect, barrier.effect) == ("as it is", "drag", "barrier")
+    base, drag, sliding = what_if(scene)
+    assert (base.effect, drag.effect, sliding.effect) == ("as it is", "drag", "sliding")
     assert drag.change == "semi-implicit → explicit"
-    assert barrier.change == "sliding → fixed"
+    assert sliding.change == "on → off"
     assert drag.steps > 20 * base.steps
-    assert barrier.steps == base.steps
+    assert sliding.steps == base.steps
 
 
 def test_command(tmp_path, monkeypatch):

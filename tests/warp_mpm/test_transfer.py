@@ -81,7 +81,9 @@ class Bench:
         grid, parameters = simulation._grid, simulation._parameters
         simulation._launch("clear", simulation._workers, grid, parameters)
         simulation._launch("forget", 1, grid)
-        simulation._launch("scatter", self.number, simulation._points, grid, parameters, simulation._clock)
+        simulation._launch(
+            "scatter", self.number, simulation._points, grid, parameters, simulation._bodies, simulation._clock
+        )
         return {name: array.numpy() for name, array in simulation._grid_arrays.items()}
 
     def gather(self, velocity, increment=None):

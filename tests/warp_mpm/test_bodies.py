@@ -1,0 +1,330 @@
+"""Bodies: outlines, the contact rule, several of them at once, and those of a script."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warp_mpm import geometry
+from warp_mpm.effect_rules import derive_effects
+from warp_mpm.grid import fit_grid
+from warp_mpm.kernels.layout import layout
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.bodies import Body, Driven, Outline, Sliding, Surface
+from warp_mpm.simulator.bodies.arrays import effects_of
+from warp_mpm.simulator.bodies.kernels import make_body_functions
+from warp_mpm.simulator.bodies.nodes import contact_nodes
+from warp_mpm.simulator.bodies.of_scene import scene_bodies
+from warp_mpm.validation.scenes import box, scene
+
+SCENES = sorted((Path(__file__).parents[2] / "scenarios").glob("**/*.json"))
+ANGLES = 2.0 * np.pi * np.arange(24) / 24.0
+CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+NOTCHED = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [2.0, 1.0], [0.0, 3.0]]
+"""A block with a notch in its top."""
+PROFILE = [[-2.0, 1.0], [-0.5, 0.0], [0.5, 0.2], [1.0, 1.5], [3.0, 1.5]]
+"""Ground that is not flat."""
+OUTLINES = {
+    "circle": Outline(CIRCLE),
+    "notched": Outline(NOTCHED),
+    "barrier": Outline(geometry.trapezoid(4.0, 1.0, 2.0), closed=False),
+    "needle": Outline(geometry.trapezoid(4.0, 0.0, 2.0), closed=False),
+    "profile": Outline(PROFILE, closed=False),
+}
+
+
+def places():
+    return np.random.default_rng(7).uniform(-3.0, 5.0, (2000, 2))
+
+
+@pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
+def test_distance_and_normal_are_those_of_the_outline(outline):
+    """Against the outline's own points, finely laid, and the solid as a polygon."""
+    corners = outline.vertices
+    if not outline.closed:
+        first, last = corners[0] - corners[1], corners[-1] - corners[-2]
+        ends = [corners[0] + 100.0 * first / np.hypot(*first), corners[-1] + 100.0 * last / np.hypot(*last)]
+        corners = np.array([ends[0], *corners, ends[1]])
+        around = [[corners[-1, 0], -200.0], [corners[0, 0], -200.0]]
+        solid = np.concatenate([corners, around])
+        laid = np.concatenate([np.linspace(a, b, 40_001) for a, b in pairwise(corners)])
+    else:
+        solid = corners
+        laid = np.concatenate([np.linspace(a, b, 4001) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)])
+    place = places()
+    nearest = np.array([np.hypot(*(laid - p).T).min() for p in place])
+    inside = geometry.contains(solid, place)
+    distance = outline.distance(place)
+    np.testing.assert_allclose(np.abs(distance), nearest, atol=2e-3)
+    clear = nearest > 1e-3
+    assert (inside == (distance < 0.0))[clear].all()
+    assert 100 < inside.sum() < 1900
+    # The normal is the distance's gradient; not where two pieces are equally near.
+    step = 1e-7
+    gradient = np.stack(
+        [(outline.distance(place + e) - outline.distance(place - e)) / (2.0 * step) for e in step * np.eye(2)], axis=1
+    )
+    smooth = np.abs(np.hypot(*gradient.T) - 1.0) < 1e-6
+    assert smooth.mean() > 0.99
+    np.testing.assert_allclose(outline.normal(place)[smooth], gradient[smooth], atol=1e-5)
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_the_kernels_see_the_same_distance(load_scene, precision):
+    types = layout(derive_effects(load_scene("case_1", **{"numerics.precision": precision})))
+    F, V2, nearest = types.scalar, types.V2, make_body_functions(types).nearest
+    vectors, numbers = wp.array(dtype=V2), wp.array(dtype=F)
+
+    @wp.kernel(module="unique")
+    def look(b: vectors, a: vectors, low: numbers, high: numbers, n: vectors, o: numbers, place: vectors, d: numbers,
+             normal: vectors, piece: wp.array(dtype=wp.int32)):  # fmt: skip
+        i = wp.tid()
+        distance, direction, k = nearest(b, a, low, high, n, o, 0, o.shape[0], place[i])
+        d[i] = distance
+        normal[i] = direction
+        piece[i] = k
+
+    place = places()
+    for outline in OUTLINES.values():
+        s = outline.segments
+        given = [(s.begin, V2), (s.along, V2), (s.low, F), (s.high, F), (s.normal, V2), (s.offset, F), (place, V2)]
+        found = [wp.zeros(len(place), dtype=kind, device="cpu") for kind in (F, V2, wp.int32)]
+        arrays = [wp.array(values, dtype=kind, device="cpu") for values, kind in given]
+        wp.launch(look, dim=len(place), inputs=[*arrays, *found], device="cpu")
+        distance, normal, piece = s.nearest(place)
+        tolerance = 1e-12 if precision == "float64" else 2e-6
+        np.testing.assert_allclose(found[0].numpy(), distance, atol=tolerance)
+        same = found[2].numpy() == piece
+        assert same.mean() > (0.999 if precision == "float64" else 0.99)
+        far = same & (np.abs(distance) > 0.05)
+        np.testing.assert_allclose(found[1].numpy()[far], normal[far], atol=100.0 * tolerance)
+
+
+def test_rules_of_effects_and_bodies_agree():
+    for path in SCENES:
+        scenario = Scenario.load(path)
+        bodies = scene_bodies(scenario, fit_grid(scenario))
+        effects = derive_effects(scenario)
+        assert effects == effects.with_bodies(effects_of(bodies)), path.stem
+
+
+# -- the contact rule --------------------------------------------------------------------------------------------
+
+
+def basin(formulation="dry", *, bodies=(), end_time=1.0, **options):
+    """A pool of 8 m x 2 m on smooth ground between walls, cells of 0.2 m, and bodies in or above it."""
+    walls = {"left_edge": "wall", "right_edge": "wall", "left_m": -4.0, "right_m": 4.0, "top_m": 6.0}
+    options = {"domain": walls, "spacing_m": 0.2} | options
+    return Simulation(scene("pool", box(-4.0, 4.0, 2.0), formulation, end_time=end_time, **options), bodies=bodies)
+
+
+def acting(simulation, name):
+    """Places of contact of a body now: node, mirror, surface, normal; by node."""
+    number = [body.name for body in simulation.bodies].index(name)
+    arrays = {field: array.numpy() for field, array in simulation._contacts[number].arrays.items()}
+    acts = arrays["surface"] >= 0
+    node = arrays["node"][acts]
+    order = np.lexsort(node.T[::-1])
+    return [values[acts][order] for values in (arrays["node"], arrays["mirror"], arrays["surface"], arrays["normal"])]
+
+
+def test_a_body_that_passes_acts_where_one_at_rest_would():
+    """The kernel's rule against that in NumPy, for a pillar that has moved across the grid."""
+    pillar = Body("pillar", Outline(0.7 * CIRCLE + [0.0, 3.5]), motion=Driven((0.0,), ((3.0, -1.0),)))
+    simulation = basin(bodies=[pillar])
+    for time in (0.03, 0.2):
+        simulation.advance(time)
+        # As it lay at the begin of the last step.
+        step = float(simulation._clock.numpy()[2])
+        moved = np.array(simulation.body_displacement("pillar")) - step * np.array([3.0, -1.0])
+        there = replace(pillar, outline=Outline(pillar.outline.vertices + moved))
+        nodes = contact_nodes(there, simulation.grid)
+        order = np.lexsort(nodes.node.T[::-1])
+        node, mirror, surface, normal = acting(simulation, "pillar")
+        assert len(node) > 20
+        np.testing.assert_array_equal(node, nodes.node[order])
+        np.testing.assert_allclose(normal, nodes.normal[order], atol=1e-12)
+        assert (mirror == -1).all()
+        assert len(set(surface)) == 1
+
+
+def test_walls_stay_in_place_while_the_grid_rides(load_scene):
+    """Seen from a grid that rides with a barrier they move; each acts at the nearest line of cell corners."""
+    changes = {
+        "barrier.motion": {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [2.0]},
+        "numerics.spacing_m": 0.5,
+        "domain.left_edge": "wall", "domain.right_edge": "wall", "domain.left_m": -25.0, "domain.right_m": 20.0,
+    }  # fmt: skip
+    simulation = Simulation(load_scene("case_1", **changes))
+    simulation.advance(0.4)
+    step = float(simulation._clock.numpy()[2])
+    shift = simulation.barrier_displacement - 2.0 * step
+    assert shift > 0.5
+    grid = replace(simulation.grid, left=simulation.grid.left + shift)
+    for body in simulation.bodies:
+        if body.edge:
+            nodes = contact_nodes(body, grid)
+            order = np.lexsort(nodes.node.T[::-1])
+            node, mirror, _, normal = acting(simulation, body.name)
+            np.testing.assert_array_equal(node, nodes.node[order])
+            np.testing.assert_array_equal(mirror, nodes.mirror[order])
+            np.testing.assert_array_equal(normal, nodes.normal[order])
+    sample = simulation.sample()
+    assert abs(sample["momentum_residual_x"]) < 1e-9 * abs(sample["momentum_x"])
+
+
+# -- several bodies ----------------------------------------------------------------------------------------------
+
+
+def block(left, right, height):
+    return Outline([[left, -1.0], [right, -1.0], [right, height], [left, height]])
+
+
+@pytest.mark.parametrize("formulation", ["dry", "undrained", "two_phase"])
+def test_two_sliding_blocks_and_a_pillar(formulation):
+    """A pool breaks out on both sides and shoves two blocks of different weight away; a pillar in its middle stands.
+
+    Each sliding block's momentum is what the flow and its base gave to it, its base takes no more than friction can,
+    and all impulses together are what the flow lost.
+    """
+    light, heavy = Sliding(500.0, 0.3), Sliding(2000.0, 0.1)
+    bodies = [
+        Body("left_block", block(-5.0, -4.05, 1.5), (Surface("left_block", 0.2),), light),
+        Body("right_block", block(4.03, 5.0, 1.5), motion=heavy),
+        Body("pillar", Outline(0.5 * CIRCLE + [0.0, 3.0]), (Surface("pillar", 0.4),)),
+    ]
+    simulation = basin(formulation, bodies=bodies, domain={"left_m": -12.0, "right_m": 12.0, "top_m": 6.0},
+                       velocity=(0.0, 3.0))  # fmt: skip
+    assert simulation.effects.sliding
+    assert simulation.effects.passing
+    impulse = {name: np.zeros(2) for name in ("left_block", "right_block", "pillar", "ground")}
+    interval, told = 0.05, []
+    for count in range(1, 13):
+        simulation.advance(count * interval)
+        sample = simulation.sample()
+        told.append(sample)
+        for name in impulse:
+            impulse[name] += interval * np.array([sample[f"{name}_force_x"], sample[f"{name}_force_y"]])
+    mass = simulation.points()["solid_mass"].sum() + simulation.points()["liquid_mass"].sum()
+    scale = mass * 3.0
+    for name, motion, sign in (("left_block", light, -1.0), ("right_block", heavy, 1.0)):
+        number = [body.name for body in simulation.bodies].index(name)
+        velocity = simulation.body_velocity(name)[0]
+        base = simulation._read("base_impulse")[number]
+        assert sign * velocity > 0.05
+        assert sign * simulation.body_displacement(name)[0] > 0.01
+        assert motion.mass * velocity == pytest.approx(impulse[name][0] + base, abs=1e-9 * scale)
+        assert -sign * base <= motion.base_friction * (motion.mass * 9.81 * 0.6 - impulse[name][1]) + 1e-6 * scale
+    assert simulation.body_velocity("pillar") == (0.0, 0.0)
+    assert impulse["pillar"][1] > 0.0  # the pool was thrown up against it
+    assert simulation.record["barrier_unconverged"] == 0
+    # The flow's own momentum, against all impulses and its weight.
+    last = told[-1]
+    assert abs(last["momentum_residual_x"]) < 1e-9 * scale
+    assert abs(last["momentum_residual_y"]) < 1e-9 * scale
+    expected = np.array([0.0, mass * 3.0 - mass * 9.81 * 0.6]) - sum(impulse.values())
+    np.testing.assert_allclose([last["momentum_x"], last["momentum_y"]], expected, atol=1e-9 * scale)
+    depth = simulation.bodies[-1].outline.distance(simulation.points()["position"])
+    assert depth.min() > -0.1 - 1e-9
+
+
+def test_a_second_barrier_stays_while_the_grid_rides_with_the_first(load_scene):
+    """The flow goes over a barrier that slides and meets a wall of the script behind it, which does not move."""
+    behind = Body("second", block(12.0, 13.0, 3.0))
+    changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 3.0, "barrier.shape.height_m": 2.0}
+    changes |= {"barrier.shape": {"kind": "trapezoid", "base_width_m": 4.0, "crest_width_m": 2.0, "height_m": 1.5}}
+    del changes["barrier.shape.height_m"]
+    simulation = Simulation(load_scene("case_1", **changes), bodies=[behind])
+    impulse, lowest = 0.0, 0.0
+    for count in range(1, 31):
+        simulation.advance(0.1 * count)
+        sample = simulation.sample()
+        impulse += 0.1 * sample["second_force_x"]
+        lowest = min(lowest, behind.outline.distance(simulation.points()["position"]).min())
+    assert simulation.barrier_displacement > 1.0
+    assert simulation._grid_arrays["shift"].numpy()[0] == simulation.barrier_displacement
+    assert simulation.body_displacement("second") == (0.0, 0.0)
+    assert impulse > 1e4
+    assert lowest > -0.25 - 1e-9
+    assert abs(sample["momentum_residual_x"]) < 1e-9 * 81_000.0 * 10.0
+
+
+def test_a_plate_pushes_a_pool():
+    """A piston, driven by a function: it goes where it is told, and its work is force times way."""
+    plate = Body(
+        "plate", block(-4.5, -4.0, 4.0),
+        motion=Driven.function(lambda t: (0.5 * np.sin(np.pi * t), 0.0), np.linspace(0.0, 1.0, 101)),
+    )  # fmt: skip
+    simulation = basin("two_phase", bodies=[plate], domain={"left_m": -8.0, "right_m": 4.0, "top_m": 6.0,
+                                                            "right_edge": "wall"})  # fmt: skip
+    assert not simulation.effects.sliding
+    work, before = 0.0, 0.0
+    for count in range(1, 101):
+        simulation.advance(0.01 * count)
+        way = simulation.body_displacement("plate")[0]
+        sample = simulation.sample()
+        work += sample["plate_force_x"] * (way - before)
+        before = way
+    assert before == pytest.approx(1.0 / np.pi, rel=1e-3)
+    assert sample["plate_force_x"] < 0.0  # pushed back
+    number = [body.name for body in simulation.bodies].index("plate")
+    assert simulation._read("work")[number] == pytest.approx(work, rel=2e-2)
+    assert abs(sample["momentum_residual_x"]) < 1e-6
+    assert plate.outline.distance(simulation.points()["position"] - [before, 0.0]).min() > -0.1 - 1e-9
+
+
+def test_a_run_with_bodies_goes_on_from_its_state():
+    bodies = [
+        Body("block", block(4.03, 5.0, 1.5), motion=Sliding(2000.0, 0.1)),
+        Body("pillar", Outline(0.5 * CIRCLE + [0.0, 3.0]), motion=Driven((0.0, 1.0), ((0.0, 0.0), (0.0, -2.0)))),
+    ]
+    options = {"bodies": bodies, "domain": {"left_m": -8.0, "right_m": 12.0, "top_m": 6.0}}
+    first, second = basin(**options), basin(**options)
+    first.advance(0.2)
+    second.restore_state(first.save_state())
+    for simulation in (first, second):
+        simulation.advance(0.4)
+    assert first.sample() == second.sample()
+    np.testing.assert_array_equal(first.points()["position"], second.points()["position"])
+    assert first.body_displacement("pillar")[1] < 0.0
+
+
+# -- what is absent, what is wrong -------------------------------------------------------------------------------
+
+
+def test_without_bodies_there_is_nothing_of_them():
+    flying = scene("flies", box(0.0, 1.0, 1.0), "undrained", end_time=0.1, ground=None, spacing_m=0.25)
+    simulation = Simulation(flying)
+    simulation.advance(0.01)
+    assert not [name for name in simulation.arrays if name.startswith(("bodies", "contact"))]
+    contact = {"press", "place", "collect", "slide", "push"}
+    assert not contact & {name.split()[0] for name in simulation.launched_kernels}
+    smooth = Simulation(flying.replaced({"ground": {"friction": 0.0}}))
+    absent = {"friction", "rubs", "displacement", "base_work"}
+    assert not absent & {name.split(".")[-1] for name in smooth.arrays}
+    assert "grid.liquid_alone" not in smooth.arrays
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Outline([[0, 0], [1, 1]]), "it needs 3 or more"),
+        (lambda: Outline([[0, 0], [1, 1], [1, 0], [0, 1]]), "must not cross"),
+        (lambda: Outline([[0, 0], [0, 0], [1, 0]], closed=False), "need a length"),
+        (lambda: Outline([[0, 0], [np.nan, 1], [1, 0]]), "finite"),
+        (lambda: Surface("Face"), "small letters"),
+        (lambda: Surface("face", friction=-1.0), "from 0 to 10"),
+        (lambda: Sliding(0.0, 0.1), "greater than 0"),
+        (lambda: Driven((0.0, 0.0), ((0.0, 0.0), (1.0, 0.0))), "increase"),
+        (lambda: Body("a", Outline(NOTCHED), (Surface("a", pieces=(0, 1)),)), "must belong to one surface"),
+        (lambda: basin(bodies=[Body("ground", block(9, 10, 1))]), "more than one body"),
+        (lambda: basin(bodies=[Body("in", block(0, 1, 1))]), "in holds 100 material points"),
+    ],
+)
+def test_what_makes_no_body_is_refused_in_a_sentence(make, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        make()
