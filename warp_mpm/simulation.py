@@ -28,7 +28,7 @@ from .state import saved
 from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
 from .state.divergence import NAMES, SimulationDiverged, what_diverged
 from .state.parameters import kernel_parameters
-from .state.samples import Constants, Totals, sample
+from .state.samples import OF_THE_LEDGER, Constants, Totals, sample
 from .time_step import step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
@@ -451,20 +451,27 @@ class Simulation:
         return Totals(self._read("clock").tolist(), self._read("reactions").tolist())
 
     @_one_thread_at_a_time_on_a_gpu
-    def sample(self) -> dict[str, float]:
-        """Quantities now, and forces as means over the time since the last sample (impulse over interval).
+    def sample(self, names: Collection[str] | None = None) -> dict[str, float]:
+        """Quantities now, and forces as means over the time since the last sample (impulse over interval): all, or the
+        time and what is named.
 
-        Keys without the effect they belong to are absent.
+        Keys without the effect they belong to are absent. Sums over the material points are formed only if one of them
+        is named; `seepage_work` goes from one such sample to the next.
 
         Raises:
-            SimulationDiverged: some quantity of a material point is not a finite number.
+            SimulationDiverged: some quantity of a material point is not a finite number; not every one is looked at
+                where no sum over them is formed.
         """
-        if self._ledger_graph is None:
-            self._ledger_graph = self._captured(self._sum_up)
-        wp.capture_launch(self._ledger_graph)
-        sums = self._read("sums").tolist()
-        if sums[at.LEDGER_NOT_FINITE] > 0.0:
-            raise SimulationDiverged(self._what_diverged())
+        if names is None or not OF_THE_LEDGER.isdisjoint(names):
+            if self._ledger_graph is None:
+                self._ledger_graph = self._captured(self._sum_up)
+            wp.capture_launch(self._ledger_graph)
+            sums = self._read("sums").tolist()
+            if sums[at.LEDGER_NOT_FINITE] > 0.0:
+                raise SimulationDiverged(self._what_diverged())
+        else:
+            sums = [0.0] * at.LEDGER_SIZE
+            sums[at.LEDGER_SEEPAGE] = self._last.seepage_power
         totals = self._totals()
         values = sample(
             self._constants,
@@ -477,7 +484,7 @@ class Simulation:
         self._last = replace(
             totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
         )
-        return values
+        return values if names is None else {name: values[name] for name in values if name == "time" or name in names}
 
     @property
     def record(self) -> dict[str, Any]:
