@@ -154,6 +154,12 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
         value = summary.get(name)
         if value is not None and not value <= bound:  # one that is no number calls for a remark
             found.append(f"{name} = {value:.2g} is above {bound:g}.")
+    unknown = summary.get("not_recorded") or {}
+    if unknown:
+        needed = sorted({name for names in unknown.values() for name in names})
+        found.append(
+            f"Not known, because output.quantities leaves out {', '.join(needed)}: {', '.join(sorted(unknown))}."
+        )
     if summary.get("peak_force") == 0.0:
         found.append("The flow did not touch the barrier.")
     displacement = summary.get("barrier_displacement_final")

@@ -28,6 +28,7 @@ from warp_mpm.recording import (
     run_folder,
 )
 from warp_mpm.recording.checkpoint import Checkpoint, versions
+from warp_mpm.recording.quantities import recorded_quantities
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.surfaces import write_surfaces
 from warp_mpm.results import Results, ResultsError
@@ -182,7 +183,10 @@ def _go_on(
     )
     try:
         series = TimeSeriesRecorder(
-            out / run_folder.TIME_SERIES, output.time_series_interval_s, mark=marks.get("time_series")
+            out / run_folder.TIME_SERIES,
+            output.time_series_interval_s,
+            quantities=None if output.quantities is None else recorded_quantities(scenario),
+            mark=marks.get("time_series"),
         )
     except RunFolderError:
         snapshots.close()

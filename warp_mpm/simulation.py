@@ -32,7 +32,7 @@ from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
-from .state.samples import BarrierNow, Constants, Totals, sample
+from .state.samples import OF_THE_LEDGER, BarrierNow, Constants, Totals, sample
 from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
@@ -538,21 +538,27 @@ class Simulation:
         return Totals(self.time, self._read("reactions").tolist(), base_impulse)
 
     @_one_thread_at_a_time_on_a_gpu
-    def sample(self) -> dict[str, float]:
+    def sample(self, names: Collection[str] | None = None) -> dict[str, float]:
         """Quantities now, and forces as means over the time since the last sample (impulse over interval); where no
-        step has been made since, the forces of that sample.
+        step has been made since, the forces of that sample. All, or the time and what is named.
 
-        Keys without the effect they belong to are absent.
+        Keys without the effect they belong to are absent. Sums over the material points are formed only if one of them
+        is named; `seepage_work` goes from one such sample to the next.
 
         Raises:
-            SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number.
+            SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number; not every
+                point is looked at where no sum over them is formed.
         """
-        if self._ledger_graph is None:
-            self._ledger_graph = self._captured(self._sum_up)
-        wp.capture_launch(self._ledger_graph)
-        sums = self._read("sums").tolist()
-        if sums[at.LEDGER_NOT_FINITE] > 0.0:
-            raise SimulationDiverged(self._what_diverged())
+        if names is None or not OF_THE_LEDGER.isdisjoint(names):
+            if self._ledger_graph is None:
+                self._ledger_graph = self._captured(self._sum_up)
+            wp.capture_launch(self._ledger_graph)
+            sums = self._read("sums").tolist()
+            if sums[at.LEDGER_NOT_FINITE] > 0.0:
+                raise SimulationDiverged(self._what_diverged())
+        else:
+            sums = [0.0] * at.LEDGER_SIZE
+            sums[at.LEDGER_SEEPAGE] = self._last.seepage_power
         totals = self._totals()
         barrier = BarrierNow()
         if self._barrier is not None:
@@ -585,7 +591,7 @@ class Simulation:
         self._last = replace(
             totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
         )
-        return values
+        return values if names is None else {name: values[name] for name in values if name == "time" or name in names}
 
     @property
     def record(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from analytic.force_record import (
     still_rises,
 )
 from warp_mpm import mechanism
+from warp_mpm.recording.quantities import left_out
 from warp_mpm.results import ResultsError, Snapshots
 from warp_mpm.scenario import Scenario, Sliding
 
@@ -102,14 +103,54 @@ def summarize(
     if snapshots is not None and len(snapshots) > 0:
         figures |= mechanism.deposit(scenario, snapshots[-1])
         figures["mechanism"], figures["mechanism_measures"] = mechanism.impact_mechanism(scenario, snapshots)
-    figures["mass_error"] = mass_error(series)
-    figures["momentum_error"] = momentum_error(series, scenario.gravity.acceleration_m_per_s2)
-    figures["energy_error"] = energy_error(series)
+    unknown = not_recorded(scenario)
+    errors: dict[str, Callable[[], float | None]] = {
+        "mass_error": lambda: mass_error(series),
+        "momentum_error": lambda: momentum_error(series, scenario.gravity.acceleration_m_per_s2),
+        "energy_error": lambda: energy_error(series),
+    }
+    figures |= {name: None if name in unknown else error() for name, error in errors.items()}
+    if unknown:
+        figures["not_recorded"] = unknown
     for name, value in (figures | figures.get("mechanism_measures", {})).items():
         if isinstance(value, float) and not math.isfinite(value):
             raise ResultsError(f"{name} is {value}; every figure of a run must be a finite number.")
     figures["definitions"] = DEFINITIONS
     return figures
+
+
+NEEDED = {
+    "peak_force": ("impact_force_x",),
+    "peak_force_filtered": ("impact_force_x",),
+    "impulse": ("impact_force_x",),
+    "impact_start_time": ("impact_force_x",),
+    "rise_time": ("impact_force_x",),
+    "impact_duration": ("impact_force_x",),
+    "impact_impulse": ("impact_force_x",),
+    "residual_force": ("impact_force_x",),
+    "pore_pressure_max": ("pore_pressure_max",),
+    "pore_pressure_max_anywhere": ("pore_pressure_max_anywhere",),
+    "barrier_velocity_max": ("barrier_velocity",),
+    "barrier_velocity_final": ("barrier_velocity",),
+    "barrier_at_rest": ("barrier_velocity",),
+    "barrier_displacement_final": ("barrier_displacement",),
+    "mass_error": ("solid_mass", "liquid_mass", "left_mass"),
+    "momentum_error": (
+        *("momentum_residual_x", "momentum_residual_y", "momentum_x", "momentum_y", "solid_mass", "liquid_mass"),
+    ),
+    "energy_error": (
+        *("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy"),
+        *("left_energy", "barrier_work", "seepage_work"),
+    ),
+}
+"""Quantities of the time series that a figure is taken from."""
+
+
+def not_recorded(scenario: Scenario) -> dict[str, list[str]]:
+    """Figures that are not known because `output.quantities` leaves out what they are taken from, with what that is."""
+    missing = left_out(scenario)
+    lacks = {figure: [name for name in needed if name in missing] for figure, needed in NEEDED.items()}
+    return {figure: names for figure, names in lacks.items() if names}
 
 
 def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:

@@ -10,6 +10,7 @@ from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.cli import app
 from warp_mpm.commands.several import _print as print_several
 from warp_mpm.commands.sweep import _print as print_sweep
+from warp_mpm.effect_rules import with_law
 from warp_mpm.report.content import run_content
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
@@ -36,7 +37,7 @@ def test_shipped_scenes_call_for_no_remark(path):
         ({"flow.lateral_stress_coefficient": 10}, "outside the yield surface: flow.lateral_stress_coefficient = 10"),
         ({"flow.lateral_stress_coefficient": 0.48}, "the law mohr_coulomb bears 0.49 to 2.04"),
         ({"flow.lateral_stress_coefficient": 0.0}, "outside the yield surface"),
-        ({"flow.material.friction_angle_deg": 0.0}, "bear 1 to 1"),
+        ({"flow.material.friction_angle_deg": 0.0}, "bears 1 to 1"),
         ({"flow.material.grain_density_kg_per_m3": 1000.0, "flow.material.liquid_density_kg_per_m3": 1100.0},
          "is lighter than its liquid (flow.material.liquid_density_kg_per_m3 = 1100): the skeleton starts in tension"),
         ({"flow.material.liquid_bulk_modulus_Pa": 1.0}, "liquid_bulk_modulus_Pa = 1 is too soft for the pressure of"),
@@ -65,7 +66,6 @@ def test_a_slip_is_told(load_scene, changes, words):
          "flow.velocity_m_per_s": [-15.0, 0.0]},  # a barrier that runs after the flow
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0, 2.0], "velocities_m_per_s": [30.0, 0.0]}},
         {"flow.lateral_stress_coefficient": 10, "flow.initial_stress": "zero"},
-        {"flow.lateral_stress_coefficient": 10, "flow.material.plasticity": False},
         {"flow.lateral_stress_coefficient": 3, "flow.material.cohesion_Pa": 1e5},
         {"flow.material.friction_angle_deg": 0.0, "flow.lateral_stress_coefficient": None},
         {"ground.friction": 2.0},
@@ -73,7 +73,15 @@ def test_a_slip_is_told(load_scene, changes, words):
     ],
 )  # fmt: skip
 def test_what_may_be_meant_is_not_called_a_slip(load_scene, changes):
-    assert scene_caveats(load_scene("case_1", **changes)) == []
+    about_the_domain = "numerics.spacing_m = 0.2"
+    found = scene_caveats(load_scene("case_1", **changes))
+    assert [sentence for sentence in found if about_the_domain not in sentence] == []
+
+
+def test_an_elastic_skeleton_bears_any_lateral_stress(load_scene):
+    pressed = load_scene("case_1", **{"flow.lateral_stress_coefficient": 10})
+    assert len(scene_caveats(pressed)) == 1
+    assert scene_caveats(pressed.replaced(with_law(pressed, "elastic"))) == []
 
 
 def test_a_barrier_that_still_slides_has_no_final_displacement():

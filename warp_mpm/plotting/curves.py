@@ -27,12 +27,13 @@ def force_and_displacement(results: Results) -> Figure:
     """
     series, scenario = results.time_series, results.scenario
     if "impact_force_x" not in series or scenario.barrier is None:
-        raise ResultsError(f"{results.path} has no barrier, so there is no impact force to draw.")
+        raise ResultsError(_no_force(results))
     time = series["time"]
-    moves = not isinstance(scenario.barrier.motion, Fixed)
-    rows = 3 if moves else 2
+    moves = not isinstance(scenario.barrier.motion, Fixed) and "barrier_displacement" in series
+    energies = "flow_kinetic_energy" in series
+    rows = 1 + moves + energies
     figure = Figure(figsize=(7.5, 2.5 + 2.0 * rows), layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=True, height_ratios=[2.0] + [1.0] * (rows - 1))
+    axes = figure.subplots(rows, 1, sharex=True, height_ratios=[2.0] + [1.0] * (rows - 1), squeeze=False).ravel()
     heading(figure, scenario.title)
 
     forces = axes[0]
@@ -69,7 +70,8 @@ def force_and_displacement(results: Results) -> Figure:
         displacement = series["barrier_displacement"]
         moved.plot(time, displacement, color=BLUE)
         moved.set_ylabel("barrier\ndisplacement [m]")
-        going = "" if series["barrier_velocity"][-1] == 0.0 else f", still {GOING[scenario.barrier.motion.kind]}"
+        at_rest = series.get("barrier_velocity", np.zeros(1))[-1] == 0.0
+        going = "" if at_rest else f", still {GOING[scenario.barrier.motion.kind]}"
         moved.margins(y=0.25)
         moved.annotate(
             f"{displacement[-1]:.2f} m{going}",
@@ -80,18 +82,24 @@ def force_and_displacement(results: Results) -> Figure:
             va="bottom",
             fontsize=9,
         )
-    energy = axes[-1]
-    energy.plot(time, series["flow_kinetic_energy"] / 1e3, color=BLUE, label="flow")
-    if moves and "barrier_kinetic_energy" in series:
-        energy.plot(time, series["barrier_kinetic_energy"] / 1e3, color=ORANGE, linestyle="--", label="barrier")
-    energy.set_ylabel("kinetic\nenergy [kJ/m]")
-    energy.legend(fontsize=9)
-    energy.set_ylim(bottom=0.0)
-    energy.set_xlabel("time [s]")
-    energy.set_xlim(float(time[0]), float(time[-1]))
+    if energies:
+        energy = axes[-1]
+        energy.plot(time, series["flow_kinetic_energy"] / 1e3, color=BLUE, label="flow")
+        if moves and "barrier_kinetic_energy" in series:
+            energy.plot(time, series["barrier_kinetic_energy"] / 1e3, color=ORANGE, linestyle="--", label="barrier")
+        energy.set_ylabel("kinetic\nenergy [kJ/m]")
+        energy.legend(fontsize=9)
+        energy.set_ylim(bottom=0.0)
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(float(time[0]), float(time[-1]))
     for panel in axes:
         grid(panel)
     return figure
+
+
+def _no_force(results: Results) -> str:
+    why = "has no barrier" if results.scenario.barrier is None else "does not record impact_force_x (output.quantities)"
+    return f"{results.path} {why}, so there is no impact force to draw."
 
 
 COMPARED = (
@@ -116,7 +124,7 @@ def comparison(runs: Sequence[Results]) -> Figure:
     """
     series = [results.time_series for results in runs]
     if not any("impact_force_x" in one for one in series):
-        raise ResultsError(f"{runs[0].path} has no barrier, so there is no impact force to draw.")
+        raise ResultsError(_no_force(runs[0]))
     shown = [
         row
         for row in COMPARED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -18,8 +18,21 @@ class TimeSeriesRecorder:
     The header gives names and units (`impact_force_x [N/m]`); numbers are written with all their digits.
     """
 
-    def __init__(self, path: Path, interval: float, *, mark: Mapping[str, int] | None = None):
+    def __init__(
+        self,
+        path: Path,
+        interval: float,
+        *,
+        quantities: Collection[str] | None = None,
+        mark: Mapping[str, int] | None = None,
+    ):
         """Create the file, or go on at an earlier `mark` in it; what was written after that is dropped.
+
+        Args:
+            path: of the file.
+            interval: [s] between samples.
+            quantities: keys of those that are recorded; None: all that the simulation has.
+            mark: from `mark`.
 
         Raises:
             FileExistsError: there is one already.
@@ -28,6 +41,7 @@ class TimeSeriesRecorder:
         self.schedule = Schedule(interval)
         self.latest: dict[str, float] = {}
         """The last sample, for whoever shows progress."""
+        self._quantities = quantities
         self._columns: list[str] = []
         self._file: TextIO
         if mark is None:
@@ -56,7 +70,7 @@ class TimeSeriesRecorder:
 
     def record(self, simulation: Any) -> None:
         """Append one sample."""
-        sample = simulation.sample()
+        sample = simulation.sample() if self._quantities is None else simulation.sample(self._quantities)
         if not self._columns:
             check_known(set(sample), TIME_SERIES)
             self._columns = [name for name in TIME_SERIES if name in sample]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from warp_mpm.scenario.fields import Coordinate, Friction, Interval, Model, NonNegative, set_fields
 from warp_mpm.simulator.schemes import SCHEMES
@@ -103,5 +104,22 @@ class Output(Model):
     """Interval of the time series; forces are means over it."""
     snapshot_interval_s: Interval = 0.05
     """Interval of the snapshots of all material points."""
+    quantities: Annotated[tuple[str, ...], Field(strict=False)] | None = None
+    """Names of the quantities in the time series, beside its time; null: all that the scene has. What is left out is
+    not computed where computing costs, and figures of the summary that need it are told as not recorded."""
     checkpoint_interval_s: Interval | None = None
     """Simulated time between checkpoints, from which an interrupted run goes on; null: one in 30 s of wall time."""
+
+    @field_validator("quantities")
+    @classmethod
+    def _known(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if names is not None:
+            from warp_mpm.recording.quantities import TIME_SERIES  # the recorders need the scenario's own models
+
+            known = [quantity.name for quantity in TIME_SERIES.values()]
+            for name in names:
+                if name not in known:
+                    raise ValueError(f"{json.dumps(name)[:80]} is not recorded; each must be one of {', '.join(known)}")
+                if names.count(name) > 1:
+                    raise ValueError(f"{json.dumps(name)} is there twice; each must be there once")
+        return names

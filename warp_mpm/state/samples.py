@@ -10,6 +10,13 @@ from ..effects import Effects
 from ..kernels import layout as at
 from ..simulator.bodies import Body, Sliding
 
+OF_THE_LEDGER = frozenset(
+    ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy", "seepage_work", "speed_max",
+     "solid_mass", "liquid_mass", "pore_pressure_max", "pore_pressure_max_anywhere", "momentum_x", "momentum_y",
+     "momentum_residual_x", "momentum_residual_y")
+)  # fmt: skip
+"""Quantities that need sums over all material points."""
+
 
 @dataclass(frozen=True)
 class Totals:
