@@ -52,6 +52,8 @@ class Room(Generic[T]):
         if name in self._own:
             raise ValueError(f"the {self._kind} {name!r} is one of the package's own; yours must have another name")
         key = f"{name}-{content(idea)}"
+        if self._keys.get(name) == key:
+            return  # the same again: scenes that were made with it stay valid
         self._by_name[name] = self._by_key[key] = idea
         self._keys[name] = key
 
