@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from warp_mpm.accuracy import kept as keeping
 from warp_mpm.accuracy import purchase
 from warp_mpm.accuracy.kept import Kept, cache_folder
-from warp_mpm.accuracy.pace import FINISH, LONG_ENOUGH, START, points_of
+from warp_mpm.accuracy.pace import LONG_ENOUGH, points_of
 from warp_mpm.accuracy.purchase import Offer, PurchaseError, buy
 from warp_mpm.cli import app
 from warp_mpm.scenario import Scenario
@@ -26,7 +26,7 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 class MadeUp:
     """A machine that takes a fixed time for a step and for each point in it, and never an odd moment more."""
 
-    least_cost = 1e-8
+    least_cost, around = 1e-8, 2.7
 
     def __init__(self, *, speed: float = 1.0, compiling: float = 0.0, fails: tuple[float, ...] = ()):
         self.now, self.compiling = 100.0, compiling
@@ -115,7 +115,7 @@ class TestTime:
             return
         offer = buy(scenario, budget=budget, bench=bench)
         assert bench.now - begun == pytest.approx(offer.probing)
-        took = bench.now - begun + START + bench.stepping(with_spacing(scenario, offer)) + FINISH
+        took = bench.now - begun + bench.stepping(with_spacing(scenario, offer)) + MadeUp.around
         assert took <= 1.1 * budget
         if offer.spacing > scenario.flow.depth / 100.0:
             assert took >= 0.55 * budget
@@ -129,7 +129,7 @@ class TestTime:
         coarse, fine = soft.replaced({"numerics.spacing_m": max(bench.ran)}), with_spacing(soft, offer)
         assert bench.steps(coarse) <= 2 * 300
         assert max(bench.ran) / offer.spacing > 4.0
-        assert offer.time == pytest.approx(START + bench.stepping(fine) + FINISH, rel=0.15)
+        assert offer.time == pytest.approx(bench.stepping(fine) + MadeUp.around, rel=0.15)
 
     def test_what_is_too_short_to_be_timed_is_timed_finer(self, dry: Scenario) -> None:
         bench = MadeUp(speed=50.0)
@@ -183,9 +183,9 @@ class TestBudgetThatIsShort:
         """And the sentence says that only where it is so."""
         for kept, again in ((Kept(tmp_path / "kept.json"), True), (Kept(None), False)):
             with pytest.raises(PurchaseError) as error:
-                buy(dry, budget=START + FINISH + 0.45, bench=MadeUp(speed=1.6), kept=kept)
+                buy(dry, budget=MadeUp.around + 0.45, bench=MadeUp(speed=1.6), kept=kept)
             assert ("the probes are kept, and the same command has time enough now" in str(error.value)) == again
-        offer = buy(dry, budget=START + FINISH + 0.45, bench=MadeUp(speed=1.6), kept=kept)
+        offer = buy(dry, budget=MadeUp.around + 0.45, bench=MadeUp(speed=1.6), kept=kept)
         assert offer.spacing > 0.0
 
 

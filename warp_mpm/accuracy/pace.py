@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+import statistics
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,9 +16,9 @@ from warp_mpm.performance.plan import Ahead, growth, predicted_steps
 from warp_mpm.performance.probe import Stepper, clock_of
 from warp_mpm.scenario import Scenario
 
-START, FINISH = 1.2, 1.5
-"""Time of a command [s] before its first step (imports, kernels from the cache, the scene) and after its last one
-(summary, figures); measured, and much the same for all runs but those of very many points."""
+AROUND = 105.0
+"""Time of a command before its first step (imports, kernels from the cache, the scene) and after its last one (summary,
+figures), over that of the `_gauge`; measured, 95 to 124, much the same for all runs but those of very many points."""
 
 PREPARED = 1.0
 """Time [s] of setting up a coarse scene above which its kernels were compiled and not found compiled."""
@@ -45,6 +48,9 @@ class Bench(Protocol):
     least_cost: float
     """Time [s] per point and step that it does not fall below."""
 
+    around: float
+    """Time [s] of a command before its first step and after its last one."""
+
     def clock(self) -> float:
         """Time [s]."""
 
@@ -64,6 +70,7 @@ class Machine:
 
     def __init__(self, device: str = "cpu"):
         self._device, self.clock = device, clock_of(device)
+        self.around = AROUND * statistics.median(_gauge() for _ in range(3))
         self.least_cost = LEAST_COST if device == "cpu" else LEAST_COST_ELSEWHERE
 
     def prepare(self, scenario: Scenario) -> float:
@@ -88,6 +95,18 @@ class Machine:
             if spent >= 0.9 * seconds:
                 break
         return spent / steps, stepper.furthest
+
+
+def _gauge() -> float:
+    """Time [s] of some work in Python, which tells how fast this machine is at what surrounds the steps."""
+    begin = time.process_time()
+    words = [f"{7919 * number % 10007:05d}" for number in range(20_000)]
+    counts: dict[str, int] = {}
+    for word in words:
+        counts[word[:3]] = counts.get(word[:3], 0) + 1
+    json.loads(json.dumps({word: [1.5, word] for word in words}))
+    words.sort()
+    return time.process_time() - begin
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,7 @@ from analytic.whole_file import write_whole
 from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES, Array
 from warp_mpm.accuracy.kept import Kept
 from warp_mpm.accuracy.pace import (
-    FINISH,
     LONG_ENOUGH,
-    START,
     Bench,
     Machine,
     Pace,
@@ -95,6 +93,8 @@ class Offer:
     """[m]."""
     time: float
     """Expected time of the run on this machine [s], from its start to its last figure."""
+    around: float
+    """What of it is not for steps and records but to start and to finish [s]."""
     errors: dict[str, float]
     """Expected relative errors of the key quantities."""
     values: dict[str, float]
@@ -118,7 +118,7 @@ class Offer:
         compiling = f" Compiling the kernels took {self.compiling:.2g} s, once, and is not counted."
         return (
             f"Chosen: spacing {self.spacing:.4g} m ({self.source}). Expected, on a free core: "
-            f"{self.time - START - FINISH:.2g} s for the steps and their records and about {START + FINISH:.2g} s to "
+            f"{self.time - self.around:.2g} s for the steps and their records and about {self.around:.2g} s to "
             f"start and to finish{probing if self.probing else ''}; errors of at most {self.error:.1%} ({parts})."
             f"{compiling if self.compiling else ''}"
         )
@@ -218,17 +218,20 @@ def buy(
     if scenario.barrier is None:
         raise PurchaseError("This scene has no barrier, so it has no figures whose accuracy could be bought.")
     asked = f"--accuracy {100.0 * accuracy:g}%" if accuracy is not None else f"--budget {budget:g}s"
-    if budget is not None and budget <= START + FINISH:
+    bench = bench or Machine()
+    if budget is not None and budget <= bench.around:
         raise PurchaseError(
-            f"{asked} is too short for any scene: to start and to finish, a run takes about {START + FINISH:.2g} s."
+            f"{asked} is too short for any scene: to start and to finish, a run takes about {bench.around:.2g} s."
         )
-    probes = _Probes(scenario, asked, budget, bench or Machine(), kept or Kept(None), agree, on_probe)
+    probes = _Probes(scenario, asked, budget, bench, kept or Kept(None), agree, on_probe)
     offer = probes.chosen_before()
     if offer is None:
         rungs, time, source = probes.shipped() or probes.own()
         sold = sold_spacings(scenario, max(rung.spacing for rung in rungs))
         probes.check_room(sold[-1], time(sold[-1]))
-        offer = probes.keep(choose(rungs, sold, time, accuracy=accuracy, budget=probes.left, source=source))
+        offer = probes.keep(
+            choose(rungs, sold, time, accuracy=accuracy, budget=probes.left, around=bench.around, source=source)
+        )
     else:
         on_probe("This was asked before; the choice was kept.")
     if budget is None and offer.time > LONG:
@@ -243,6 +246,7 @@ def choose(
     *,
     accuracy: float | None = None,
     budget: float | None = None,
+    around: float = 0.0,
     source: str = "",
 ) -> Offer:
     """The offer that a ladder allows; see `buy`.
@@ -253,6 +257,7 @@ def choose(
         time: expected time of a run [s] at a spacing.
         accuracy: greatest error.
         budget: greatest time [s].
+        around: what of a time is to start and to finish [s].
         source: what the ladder rests on.
     """
     law = _Law(rungs)
@@ -283,7 +288,7 @@ def choose(
             middle = (coarse + fine) // 2
             coarse, fine = (middle, fine) if time(sold[middle]) <= budget else (coarse, middle)
         spacing = sold[coarse]
-    return Offer(spacing, time(spacing), law.errors(spacing), law.values, source)
+    return Offer(spacing, time(spacing), around, law.errors(spacing), law.values, source)
 
 
 class _Probes:
@@ -322,7 +327,7 @@ class _Probes:
 
     def keep(self, offer: Offer) -> Offer:
         """Keep the choice; where another process has kept one meanwhile, that holds."""
-        choice = {name: getattr(offer, name) for name in ("spacing", "time", "errors", "values", "source")}
+        choice = {name: getattr(offer, name) for name in ("spacing", "time", "around", "errors", "values", "source")}
         content = self._kept.add({"choices": {self._asked: choice}})
         return replace(Offer(**content["choices"][self._asked]), probing=self.spent, compiling=self._compiling)
 
@@ -394,7 +399,7 @@ class _Probes:
             if expected > LONG:
                 self.ask(f"probes of about {duration(expected)}")
             return every
-        room = self._budget - START - FINISH
+        room = self._budget - self._bench.around
         if self._least(first) > room:
             raise self._short(
                 f"a run at {first:.4g} m, the coarsest probe, takes {duration(self._least(first))} at least"
@@ -414,7 +419,7 @@ class _Probes:
 
     def _short(self, why: str) -> PurchaseError:
         return PurchaseError(
-            f"{self._asked} is too short for this scene: {why}, and about {START + FINISH:.2g} s go to start and "
+            f"{self._asked} is too short for this scene: {why}, and about {self._bench.around:.2g} s go to start and "
             "finish; ask for more, or choose by --spacing."
         )
 
@@ -438,7 +443,7 @@ class _Probes:
         return self._scenario.replaced({"numerics.spacing_m": spacing})
 
     def _time(self, pace: Pace) -> Callable[[float], float]:
-        return lambda spacing: START + pace.time(self._at(spacing)) + FINISH
+        return lambda spacing: pace.time(self._at(spacing)) + self._bench.around
 
     def _known(self, spacing: float) -> Result | None:
         found: Result | None = self._kept.content().get("probes", {}).get(f"{spacing:.12g}")
@@ -453,7 +458,7 @@ class _Probes:
         self._prepare(setting.scenario)
         limit = math.inf
         if self._budget is not None:
-            limit = self._budget - START - FINISH - self.spent
+            limit = self._budget - self._bench.around - self.spent
         elif not self._agreed:
             limit = LONG
         result = self._bench.measure(setting.scenario, limit)
@@ -516,7 +521,7 @@ def _sound(content: Mapping[str, Any]) -> bool:
                 return False
         for choice in content.get("choices", {}).values():
             offer = Offer(**choice)
-            if not _numbers([offer.spacing, offer.time, *offer.errors.values(), *offer.values.values()]):
+            if not _numbers([offer.spacing, offer.time, offer.around, *offer.errors.values(), *offer.values.values()]):
                 return False
             if not offer.errors or offer.spacing <= 0.0 or not set(offer.errors) <= set(KEY_QUANTITIES):
                 return False
