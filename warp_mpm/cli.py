@@ -72,9 +72,14 @@ def run(
     budget: Annotated[
         str | None,
         typer.Option(
-            metavar="TIME", help="Choose the finest spacing that fits into this time: 60s, 10min.", show_default=False
+            metavar="TIME",
+            help="Choose the finest spacing that fits into this time, start and probing included: 60s, 10min.",
+            show_default=False,
         ),
     ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Begin what --accuracy takes more than five minutes for without asking.")
+    ] = False,
     report: Annotated[bool, typer.Option("--report", help="Write report.html into the folder at the end.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the summary as JSON, SI units, in place of the table.")
@@ -137,7 +142,7 @@ def run(
         from warp_mpm.commands.accuracy import bought
 
         begun = time.process_time()
-        offer, scenario = bought(scenario, accuracy, budget, device, quiet=quiet)
+        offer, scenario = bought(scenario, accuracy, budget, device, quiet=quiet, yes=yes)
         probing = time.process_time() - begun
     from warp_mpm.simulation import Simulation, SimulationDiverged
 

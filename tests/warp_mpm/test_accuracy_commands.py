@@ -48,6 +48,7 @@ def test_refuses_in_one_sentence(coarse: Path, tmp_path: Path, options: list[str
 def test_buys_runs_and_settles(coarse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarser probes than those of a user, to be quick."""
     monkeypatch.setattr(purchase, "PROBE_CELLS", (3.0, 4.0, 5.0))
+    monkeypatch.setenv("WARP_MPM_CACHE_DIR", str(tmp_path / "cache"))
     folder = tmp_path / "run"
     result = CliRunner().invoke(app, ["run", str(coarse), "--accuracy", "50%", "--out", str(folder)])
     assert result.exit_code == 0, result.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -19,8 +20,13 @@ CURVES = ("impact_force_x", "flow_kinetic_energy", "barrier_displacement")
 PROFILED_TIME, STRETCHES = 0.02, 5
 """Simulated time [s] over which the kernels are timed one by one, after the run, and its parts."""
 
+PACES = 100
+"""Stretches of a run, at most, of which speed and cost of a step are kept."""
 
-def measure(scenario: Scenario, *, profile: bool = False, device: str = "cpu") -> dict[str, Any]:
+
+def measure(
+    scenario: Scenario, *, profile: bool = False, device: str = "cpu", limit: float = math.inf
+) -> dict[str, Any]:
     """Run a scenario without writing anything.
 
     Times are CPU times of this process, which a machine that is busy with other things does not stretch.
@@ -29,10 +35,12 @@ def measure(scenario: Scenario, *, profile: bool = False, device: str = "cpu") -
         scenario: what to run.
         device: on which; the times are told by the CPU's clock only where it is the CPU.
         profile: time the kernels too, over a short stretch after the end.
+        limit: time [s] of stepping and recording after which the run is given up.
 
     Returns:
-        Plain JSON values: `status` (finished or diverged), `problem`, `figures`, `curves`, `cpu_time` (of stepping) and
-        its companions [s], `steps`, `material_points`, `kernel_times` (shares of a step).
+        Plain JSON values: `status` (finished, diverged or given up), `problem`, `figures`, `curves`, `cpu_time` (of
+        stepping) and its companions [s], `end_time` that was reached [s], `steps`, `material_points`, `paces` (of each
+        stretch its begin [s], greatest speed of the flow [m/s], time of a step [s]), `kernel_times` (shares of a step).
     """
     from warp_mpm.simulation import Simulation, SimulationDiverged
 
@@ -49,21 +57,30 @@ def measure(scenario: Scenario, *, profile: bool = False, device: str = "cpu") -
     count = max(round(output.end_time_s / output.time_series_interval_s), 1)
     stepping = recording = 0.0
     samples = [simulation.sample()]
+    paces: list[tuple[float, float, float, int]] = []
     wall = time.perf_counter()
     try:
         for number in range(1, count + 1):
+            begin, before = simulation.time, simulation.steps
             start = time.process_time()
             simulation.advance(min(number * output.time_series_interval_s, output.end_time_s))
             half = time.process_time()
             samples.append(simulation.sample())
             stepping, recording = stepping + half - start, recording + time.process_time() - half
+            paces.append((begin, samples[-1]["speed_max"], half - start, simulation.steps - before))
+            if stepping + recording > limit and number < count:
+                found |= {"status": "given up", "problem": f"given up at t = {simulation.time:.3g} s"}
+                break
     except SimulationDiverged as error:
         found |= {"status": "diverged", "problem": str(error)}
     found |= {
         "cpu_time": stepping,
         "recording_time": recording,
         "wall_time": time.perf_counter() - wall,
+        "end_time": simulation.time,
         "steps": simulation.steps,
+        "samples": len(samples),
+        "paces": _thinned(paces),
         "figures": {},
         "curves": {},
         "kernel_times": {},
@@ -92,6 +109,15 @@ def _figures(scenario: Scenario, simulation: Any, series: dict[str, Any]) -> dic
     shift = simulation.barrier_displacement if scenario.barrier is not None else None
     snapshot = Snapshot(simulation.time, shift, points.pop("position"), points)
     return figures | mechanism.deposit(scenario, snapshot)
+
+
+def _thinned(paces: list[tuple[float, float, float, int]]) -> list[list[float]]:
+    """Begin [s], greatest speed [m/s] and mean time of a step [s] of at most `PACES` stretches."""
+    together, found = max(1, math.ceil(len(paces) / PACES)), []
+    for first in range(0, len(paces), together):
+        begins, speeds, times, steps = zip(*paces[first : first + together], strict=True)
+        found.append([begins[0], max(speeds), sum(times) / max(sum(steps), 1)])
+    return found
 
 
 def _kernel_times(simulation: Any) -> dict[str, float]:

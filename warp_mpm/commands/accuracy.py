@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from analytic.command_line import complain, refusals
-from warp_mpm.commands.options import with_options
+from warp_mpm.commands.options import agreed, with_options
 
 if TYPE_CHECKING:
     from warp_mpm.accuracy.purchase import Offer
@@ -140,14 +140,24 @@ def _check(scenario: Scenario, folder: Path, page: Path | None) -> None:
 
 
 def bought(
-    scenario: Scenario, accuracy: str | None, budget: str | None, device: str, *, quiet: bool
+    scenario: Scenario, accuracy: str | None, budget: str | None, device: str, *, quiet: bool, yes: bool
 ) -> tuple[Offer, Scenario]:
     """What `run --accuracy` or `run --budget` buys, and the scenario with the spacing that was chosen.
+
+    Args:
+        scenario: what will be run.
+        accuracy: as typed.
+        budget: as typed.
+        device: on which.
+        quiet: print nothing but questions.
+        yes: what takes long is agreed to.
 
     Raises:
         typer.Exit: 2, after one sentence, where it cannot be had.
     """
     with refusals():
+        from warp_mpm.accuracy.kept import Kept
+        from warp_mpm.accuracy.pace import Machine
         from warp_mpm.accuracy.purchase import buy, percent, seconds
 
         say = (lambda sentence: None) if quiet else (lambda sentence: typer.echo(sentence, err=True))
@@ -155,7 +165,9 @@ def bought(
             scenario,
             accuracy=None if accuracy is None else percent(accuracy),
             budget=None if budget is None else seconds(budget),
-            device=device,
+            bench=Machine(device),
+            kept=Kept.of(scenario, device),
+            agree=lambda what: yes or agreed(f"{what}. Begin?"),
             on_probe=say,
         )
         say(offer.described())

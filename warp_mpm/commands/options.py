@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+import typer
 
 from analytic.command_line import CommandLine, complain
 
@@ -46,6 +49,13 @@ def with_options(scenario: Scenario, *, spacing: float | None, until: float | No
         for name in given:
             text = text.replace(FIELDS[name], f"--{name}")
         raise ScenarioError(text.split("\n")) from None
+
+
+def agreed(question: str) -> bool:
+    """Whether the user agrees; where nobody can be asked, nobody does."""
+    if sys.stdin is None or sys.stderr is None or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    return typer.confirm(question, err=True)
 
 
 def times_of(text: str | None) -> tuple[float, ...] | None:

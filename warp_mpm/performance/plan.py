@@ -6,7 +6,7 @@ import math
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -209,7 +209,7 @@ def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:
     return ahead
 
 
-def predicted_steps(scenario: Scenario, ahead: list[Ahead]) -> int:
+def predicted_steps(scenario: Scenario, ahead: Sequence[Ahead]) -> int:
     """Number of steps, as the simulation chooses them: within the limits, and landing on every record.
 
     Args:
@@ -219,7 +219,7 @@ def predicted_steps(scenario: Scenario, ahead: list[Ahead]) -> int:
     return math.ceil(sum(steps for steps, _ in _steps(scenario, ahead)))
 
 
-def growth(scenario: Scenario, ahead: list[Ahead], until: float) -> float:
+def growth(scenario: Scenario, ahead: Sequence[Ahead], until: float) -> float:
     """Mean cost of the run's steps over that of its steps until a time [s], as the twin's steps became dearer [-]."""
     known = [stretch.step_cost for stretch in ahead if stretch.begin < until] or [ahead[0].step_cost]
     steps = _steps(scenario, ahead)
@@ -227,7 +227,7 @@ def growth(scenario: Scenario, ahead: list[Ahead], until: float) -> float:
     return mean / statistics.mean(known)
 
 
-def _steps(scenario: Scenario, ahead: list[Ahead]) -> list[tuple[float, Ahead]]:
+def _steps(scenario: Scenario, ahead: Sequence[Ahead]) -> list[tuple[float, Ahead]]:
     """Numbers of steps, and what the twin saw at their time; at most some thousand stretches of the run."""
     limits, numerics, output = step_limits(scenario), scenario.numerics, scenario.output
     interval = min(output.time_series_interval_s, output.snapshot_interval_s, output.end_time_s)
