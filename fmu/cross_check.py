@@ -17,7 +17,6 @@ Four ways of giving the unit its force are compared with the simulation:
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -125,7 +124,7 @@ def cross_check(
     SceneError: the closed form has no answer to the scenario.
     CalibrationError: the flow does not hit the barrier within the run.
     """
-    scene = scene_of(json.loads(scenario.model_dump_json()), scenario.title)
+    scene = scene_of(scenario, scenario.title)
     scene.impact()  # what the closed form has no answer to is refused before it is simulated
     simulated = simulate(scenario, device=device, on_progress=on_progress)
     fit = calibrate(simulated.time, simulated.force, scene)
