@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 from analytic.calibration import bounded_from_below, calibrate, measure, measured_vertical_load_ratio, warnings
 from analytic.force_record import cumulative_impulse, moving_mean
-from analytic.impact import friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
 
 if TYPE_CHECKING:
@@ -207,15 +206,10 @@ def scene_parameters(scene: Scene) -> dict[str, Any]:
         "flow_height": scene.flow_height,
         "speed": scene.speed,
         "gravity": scene.gravity,
+        "slope": scene.slope,
     }
     if scene.barrier_mass is None:
         return parameters | {"barrier_fixed": True}
-    if scene.slope != 0:
-        # The unit has no slope. In it gravity acts on the barrier's base alone, so that less of it does the same:
-        # tan(delta_b) g' = g (tan(delta_b) cos(theta) - sin(theta)).
-        assert scene.base_friction is not None
-        deceleration = friction_deceleration(scene.gravity, scene.base_friction, scene.slope)
-        parameters["gravity"] = deceleration / scene.base_friction
     return parameters | {"barrier_mass": scene.barrier_mass, "base_friction": scene.base_friction}
 
 
