@@ -17,7 +17,6 @@ Four ways of giving the unit its force are compared with the simulation:
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 from analytic.calibration import bounded_from_below, calibrate, measure, measured_vertical_load_ratio, warnings
 from analytic.force_record import cumulative_impulse, moving_mean
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
+from fmu.instance import instance
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario
@@ -215,42 +215,22 @@ def scene_parameters(scene: Scene) -> dict[str, Any]:
 
 def run_unit(unit: Path, parameters: dict[str, Any], simulated: Trajectory) -> Trajectory:
     """The unit's trajectory at the simulation's times, through fmpy, with the simulated loads as inputs if asked."""
-    from fmpy import extract, read_model_description
-    from fmpy.fmi2 import FMU2Slave
-
-    description = read_model_description(str(unit))
-    variables = {variable.name: variable for variable in description.modelVariables}
-    folder = extract(str(unit), unzipdir=tempfile.mkdtemp(prefix="fmu_check_"))
-    fmu = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=folder,
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="cross_check",
-    )
-    try:
-        fmu.instantiate()
-        fmu.setupExperiment(startTime=float(simulated.time[0]))
-        for name, value in parameters.items():
-            {"Real": fmu.setReal, "Integer": fmu.setInteger, "Boolean": fmu.setBoolean}[variables[name].type](
-                [variables[name].valueReference], [value]
-            )
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
-        outputs = [variables[n].valueReference for n in ("impact_force", "barrier_velocity", "barrier_displacement")]
-        inputs = [variables[name].valueReference for name in ("impact_force_input", "vertical_load")]
-        rows = [fmu.getReal(outputs)]
-        for index in range(len(simulated.time) - 1):
+    outputs = ("impact_force", "barrier_velocity", "barrier_displacement")
+    with (
+        tempfile.TemporaryDirectory(prefix="fmu_check_", ignore_cleanup_errors=True) as folder,
+        instance(unit, Path(folder)) as fmu,
+    ):
+        fmu.initialize(float(simulated.time[0]), **parameters)
+        rows = [fmu.reals(outputs)]
+        for index in range(1, len(simulated.time)):
             if parameters.get("impact_force_source") == 2:
                 assert simulated.vertical_load is not None
                 # The simulation's forces are means over the interval that ends at their time.
-                fmu.setReal(inputs, [simulated.force[index + 1], simulated.vertical_load[index + 1]])
-            now = float(simulated.time[index])
-            fmu.doStep(now, float(simulated.time[index + 1]) - now)
-            rows.append(fmu.getReal(outputs))
-        fmu.terminate()
-    finally:
-        fmu.freeInstance()
-        shutil.rmtree(folder, ignore_errors=True)
+                fmu["impact_force_input"] = float(simulated.force[index])
+                fmu["vertical_load"] = float(simulated.vertical_load[index])
+            fmu.step(float(simulated.time[index]) - fmu.time)
+            rows.append(fmu.reals(outputs))
+        fmu.fmu.terminate()
     return Trajectory(simulated.time, *np.array(rows).T)
 
 
