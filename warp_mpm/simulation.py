@@ -104,6 +104,7 @@ class Simulation:
         self._constants = Constants(self.effects, barrier_mass=mass, barrier_weight=weight)
         self._last = self._totals()
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
+        self._scene_mark = saved.scene_mark(scenario.resolved())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
@@ -273,7 +274,7 @@ class Simulation:
             {name: self._point_arrays[name].numpy() for name in NAMES if name in self._point_arrays},
             time=self.time,
             steps=self.steps,
-            barrier_velocity=self.barrier_velocity,
+            barrier_velocity=self._clock_entry(at.BARRIER_VELOCITY),
             numerics=self.scenario.numerics,
         )
 
@@ -332,14 +333,14 @@ class Simulation:
         return int(self._read("counters")[at.STEPS])
 
     @property
-    def barrier_displacement(self) -> float:
-        """Displacement of the barrier [m]."""
-        return self._clock_entry(at.GRID_SHIFT)
+    def barrier_displacement(self) -> float | None:
+        """Displacement of the barrier [m]; None without a barrier."""
+        return None if self.scenario.barrier is None else self._clock_entry(at.GRID_SHIFT)
 
     @property
-    def barrier_velocity(self) -> float:
-        """Velocity of the barrier [m/s]."""
-        return self._clock_entry(at.BARRIER_VELOCITY)
+    def barrier_velocity(self) -> float | None:
+        """Velocity of the barrier [m/s]; None without a barrier."""
+        return None if self.scenario.barrier is None else self._clock_entry(at.BARRIER_VELOCITY)
 
     def set_barrier_velocity(self, velocity: float) -> None:
         """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion."""
@@ -483,5 +484,6 @@ class Simulation:
             "last.reactions": self._last.reactions,
             "last.seepage": [self._last.seepage_power, self._last.seepage_work],
             "initial_momentum": self._initial_momentum,
+            "scene": self._scene_mark,
         }
         return state | {name: np.array(values) for name, values in kept.items()}

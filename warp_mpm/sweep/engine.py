@@ -28,7 +28,7 @@ Row = dict[str, Any]
 def run_sweep(
     sweep: Sweep,
     base: Scenario,
-    out: Path,
+    out: str | Path,
     *,
     workers: int = 2,
     scheduler: str | None = None,
@@ -61,6 +61,7 @@ def run_sweep(
     Raises:
         SweepError: a case is impossible, or the folder holds another sweep; nothing was run.
     """
+    out = Path(out)
     cases = sweep.cases(base)
     _claim(out, {**sweep.model_dump(mode="json"), "scenario": base.resolved()})
     done = {case.number: row for case in cases if (row := _row_of(case, out, retry_failed)) is not None}
