@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.impact import STANDARD_GRAVITY, VARIANTS, Impact, Motion
+from analytic.impact import STANDARD_GRAVITY, VARIANTS, Impact
+from analytic.sliding import Motion
 
 Array = NDArray[np.float64]
 

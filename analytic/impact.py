@@ -18,7 +18,7 @@ leaves of it, R = m2 g (tan(delta_b) cos(theta) - sin(theta)). Three variants an
 All quantities are SI per metre of width. Every function of time is evaluated from a polynomial of at most third degree
 in the time since its phase began: there is no time step and no integration error. Equation numbers are the paper's;
 ``docs/closed_form.md`` derives the corrected forms. This file is shipped inside the FMU, hence it imports nothing but
-``math`` and its like.
+the standard library and ``analytic.sliding``, which is shipped with it.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+
+from analytic.sliding import Motion, coulomb_motion
 
 STANDARD_GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], the paper's value."""
@@ -42,32 +44,6 @@ PHASES = ("approach", "stick", "acceleration", "deceleration", "inertia", "rest"
 ``deceleration``: the barrier slides while the force is above (below) the friction. ``inertia``: the force has ended,
 the barrier still slides. ``rest``: the force has ended, the barrier does not move.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Motion of a body from ``start`` on, a cubic in time: displacement, velocity, acceleration, jerk at the start."""
-
-    start: float
-    displacement: float
-    velocity: float
-    acceleration: float = 0.0
-    jerk: float = 0.0
-
-    def displacement_at(self, t: float) -> float:
-        """Displacement [m] at the time ``t`` [s]."""
-        u = t - self.start
-        return self.displacement + u * (self.velocity + u * (self.acceleration / 2 + u * self.jerk / 6))
-
-    def velocity_at(self, t: float) -> float:
-        """Velocity [m/s] at the time ``t`` [s]."""
-        u = t - self.start
-        return self.velocity + u * (self.acceleration + u * self.jerk / 2)
-
-    def shifted(self, t: float) -> Motion:
-        """The same motion, described from the time ``t`` on."""
-        acceleration = self.acceleration + (t - self.start) * self.jerk
-        return Motion(t, self.displacement_at(t), self.velocity_at(t), acceleration, self.jerk)
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,7 +328,7 @@ class Impact:
     def _barrier_at_impact_end(self, impulse: float) -> Motion:
         motion = Motion(0.0, 0.0, self.barrier_initial_velocity)
         for start, end, force, rate in self._force_pieces(impulse):
-            pieces = coulomb_motion(start, end, force, rate, motion, self._driven_mass, self.threshold_force)
+            pieces = coulomb_motion(motion, start, end, force, rate, self.threshold_force, 0.0, self._driven_mass)
             motion = list(pieces)[-1].shifted(end)
         return motion
 
@@ -388,7 +364,7 @@ class Impact:
                     -force / self.flow_mass,
                     -rate / self.flow_mass,
                 )
-                pieces = list(coulomb_motion(start, end, force, rate, barrier, self._driven_mass, threshold))
+                pieces = list(coulomb_motion(barrier, start, end, force, rate, threshold, 0.0, self._driven_mass))
             for piece in pieces:
                 u = piece.start - start
                 above = force > threshold or (force == threshold and rate > 0)
@@ -442,70 +418,6 @@ def friction_deceleration(gravity: float, base_friction: float, slope: float) ->
     """
     angle = math.radians(slope)
     return gravity * (base_friction * math.cos(angle) - math.sin(angle))
-
-
-def coulomb_motion(
-    start: float, end: float, force: float, force_rate: float, before: Motion, mass: float, friction: float
-) -> Iterator[Motion]:
-    """Exact motion of a body on a frictional base under a force that is linear in time.
-
-    Parameters
-    ----------
-    start, end: times [s].
-    force, force_rate: horizontal force at ``start`` [N/m] and its rate [N/(m s)]; of either sign.
-    before: motion of the body up to ``start``.
-    mass: [kg/m], may be infinite.
-    friction: the largest force that the base resists [N/m] >= 0.
-
-    Yields
-    ------
-    The pieces of the motion in order of time: sliding, or held still while the force is below the friction.
-    """
-    t, displacement, velocity = start, before.displacement_at(start), before.velocity_at(start)
-    if math.isinf(mass):
-        yield Motion(t, displacement, 0.0)
-        return
-    now = force
-    while t < end:
-        if velocity == 0:
-            direction = _breakaway(now, force_rate, friction)
-            if direction == 0:
-                yield Motion(t, displacement, 0.0)
-                wait = (math.copysign(friction, force_rate) - now) / force_rate if force_rate else math.inf
-                # A force that starts beyond the threshold on its way back crosses it only on the other side.
-                t, now = t + max(wait, 0.0), math.copysign(friction, force_rate)
-                continue
-        else:
-            direction = math.copysign(1.0, velocity)
-        piece = Motion(t, displacement, velocity, (now - direction * friction) / mass, force_rate / mass)
-        yield piece
-        stop = _first_stop(piece)
-        if t + stop >= end:
-            return
-        t, displacement, velocity = t + stop, piece.displacement_at(t + stop), 0.0
-        # What stops a body cannot drive it on: keeps rounding from setting it going again at the same instant.
-        now = direction * min(direction * (force + (t - start) * force_rate), friction)
-
-
-def _breakaway(force: float, rate: float, friction: float) -> float:
-    """Direction in which a body at rest begins to move: 1, -1, or 0 if the base holds it."""
-    if abs(force) > friction or (abs(force) == friction and force * rate > 0) or (friction == 0 and force == 0 != rate):
-        return math.copysign(1.0, force if force else rate)
-    return 0.0
-
-
-def _first_stop(motion: Motion) -> float:
-    """Time after its start [s] at which a motion first comes to rest, infinite if it does not."""
-    a, b, c = motion.jerk / 2, motion.acceleration, motion.velocity
-    if c == 0:
-        return -b / a if a * b < 0 else math.inf
-    discriminant = b * b - 4 * a * c
-    if discriminant < 0:
-        return math.inf
-    q = -(b + math.copysign(math.sqrt(discriminant), b)) / 2
-    roots = ([q / a] if a else []) + ([c / q] if q else [])
-    # A root of +0.0 is a positive one that underflowed: the motion starts with a velocity that is not nil.
-    return min((root for root in roots if math.copysign(1.0, root) > 0), default=math.inf)
 
 
 def _moves(motion: Motion) -> bool:

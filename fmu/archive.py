@@ -34,6 +34,8 @@ _ROOT = _HERE.parent
 _COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
 _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
+_IMPORT_OF_ANALYTIC = re.compile(r"^( *)from analytic\.", re.MULTILINE)
+
 _WRAPPER_FAULTS = {
     # pythonfmu 0.7.0, linux64: when the process exits, a function that runs after the destructors releases the
     # wrapper's state a second time, which corrupts the host's memory ("corrupted double-linked list"). The destructor
@@ -68,13 +70,14 @@ class BuildError(Exception):
 
 @dataclass(frozen=True)
 class PythonUnit:
-    """A unit that pythonfmu packs: its module in ``fmu/units``, its slave class, and other modules that it needs."""
+    """A unit that pythonfmu packs: its module in ``fmu/units``, its slave class, and other modules that it needs, of
+    that folder and of ``analytic``."""
 
     name: str
     module: str
     slave: str
     other_modules: tuple[str, ...] = ()
-    needs_impact: bool = False
+    analytic_modules: tuple[str, ...] = ()
 
     @property
     def interface(self) -> Interface:
@@ -86,7 +89,9 @@ class PythonUnit:
 DEFAULT_SCENARIO = SCENARIOS / "set_iib.json"
 
 PYTHON_UNITS = (
-    PythonUnit("BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", ("sliding.py",), needs_impact=True),
+    PythonUnit(
+        "BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", analytic_modules=("impact.py", "sliding.py")
+    ),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
     PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
 )
@@ -163,13 +168,8 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> Path:
 def _shipped_sources(unit: PythonUnit) -> dict[str, str]:
     names = (*_COMMON_MODULES, f"{unit.module}.py", *unit.other_modules)
     sources = {name: (_UNITS / name).read_text(encoding="utf-8") for name in names}
-    if unit.needs_impact:
-        main = f"{unit.module}.py"
-        if "from analytic.impact import" not in sources[main]:
-            raise BuildError(f"{main} does not import analytic.impact, although {unit.name} is said to need it.")
-        sources[main] = sources[main].replace("from analytic.impact import", "from .impact import")
-        sources["impact.py"] = (_ROOT / "analytic" / "impact.py").read_text(encoding="utf-8")
-    return sources
+    sources |= {name: (_ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
+    return {name: _IMPORT_OF_ANALYTIC.sub(r"\1from .", text) for name, text in sources.items()}
 
 
 def _run_pythonfmu(stage: Path, script: str, package: str) -> None:

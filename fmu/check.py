@@ -122,8 +122,7 @@ def _any_step(path: Path, folder: Path) -> str:
         if "spacing" in unit.variables:
             return "not asked of a simulation: its own time steps end where a communication step does"
         for count in (4, 20, 1000):
-            unit.reset()
-            unit.initialize()
+            unit.again()
             for _ in range(count):
                 unit.step(2.0 / count)
             ends.append(unit.real_outputs())
@@ -153,8 +152,7 @@ def _reset(path: Path, folder: Path) -> str:
         unit.initialize()
         unit.step(0.3)
         first = unit.real_outputs()
-        unit.reset()
-        unit.initialize()
+        unit.again()
         unit.step(0.3)
         other.initialize()
         other.step(0.3)
@@ -172,7 +170,7 @@ def _refusal(path: Path, folder: Path) -> str:
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             try:
-                unit.initialize({name: -1.0})
+                unit.initialize(**{name: -1.0})
             except Exception:
                 refused = True
             else:

@@ -17,8 +17,6 @@ Four ways of giving the unit its force are compared with the simulation:
 
 from __future__ import annotations
 
-import json
-import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -30,8 +28,8 @@ from numpy.typing import NDArray
 
 from analytic.calibration import bounded_from_below, calibrate, measure, measured_vertical_load_ratio, warnings
 from analytic.force_record import cumulative_impulse, moving_mean
-from analytic.impact import friction_deceleration
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
+from fmu.instance import instance
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario
@@ -125,7 +123,7 @@ def cross_check(
     SceneError: the closed form has no answer to the scenario.
     CalibrationError: the flow does not hit the barrier within the run.
     """
-    scene = scene_of(json.loads(scenario.model_dump_json()), scenario.title)
+    scene = scene_of(scenario, scenario.title)
     scene.impact()  # what the closed form has no answer to is refused before it is simulated
     simulated = simulate(scenario, device=device, on_progress=on_progress)
     fit = calibrate(simulated.time, simulated.force, scene)
@@ -208,56 +206,31 @@ def scene_parameters(scene: Scene) -> dict[str, Any]:
         "flow_height": scene.flow_height,
         "speed": scene.speed,
         "gravity": scene.gravity,
+        "slope": scene.slope,
     }
     if scene.barrier_mass is None:
         return parameters | {"barrier_fixed": True}
-    if scene.slope != 0:
-        # The unit has no slope. In it gravity acts on the barrier's base alone, so that less of it does the same:
-        # tan(delta_b) g' = g (tan(delta_b) cos(theta) - sin(theta)).
-        assert scene.base_friction is not None
-        deceleration = friction_deceleration(scene.gravity, scene.base_friction, scene.slope)
-        parameters["gravity"] = deceleration / scene.base_friction
     return parameters | {"barrier_mass": scene.barrier_mass, "base_friction": scene.base_friction}
 
 
 def run_unit(unit: Path, parameters: dict[str, Any], simulated: Trajectory) -> Trajectory:
     """The unit's trajectory at the simulation's times, through fmpy, with the simulated loads as inputs if asked."""
-    from fmpy import extract, read_model_description
-    from fmpy.fmi2 import FMU2Slave
-
-    description = read_model_description(str(unit))
-    variables = {variable.name: variable for variable in description.modelVariables}
-    folder = extract(str(unit), unzipdir=tempfile.mkdtemp(prefix="fmu_check_"))
-    fmu = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=folder,
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="cross_check",
-    )
-    try:
-        fmu.instantiate()
-        fmu.setupExperiment(startTime=float(simulated.time[0]))
-        for name, value in parameters.items():
-            {"Real": fmu.setReal, "Integer": fmu.setInteger, "Boolean": fmu.setBoolean}[variables[name].type](
-                [variables[name].valueReference], [value]
-            )
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
-        outputs = [variables[n].valueReference for n in ("impact_force", "barrier_velocity", "barrier_displacement")]
-        inputs = [variables[name].valueReference for name in ("impact_force_input", "vertical_load")]
-        rows = [fmu.getReal(outputs)]
-        for index in range(len(simulated.time) - 1):
+    outputs = ("impact_force", "barrier_velocity", "barrier_displacement")
+    with (
+        tempfile.TemporaryDirectory(prefix="fmu_check_", ignore_cleanup_errors=True) as folder,
+        instance(unit, Path(folder)) as fmu,
+    ):
+        fmu.initialize(float(simulated.time[0]), **parameters)
+        rows = [fmu.reals(outputs)]
+        for index in range(1, len(simulated.time)):
             if parameters.get("impact_force_source") == 2:
                 assert simulated.vertical_load is not None
                 # The simulation's forces are means over the interval that ends at their time.
-                fmu.setReal(inputs, [simulated.force[index + 1], simulated.vertical_load[index + 1]])
-            now = float(simulated.time[index])
-            fmu.doStep(now, float(simulated.time[index + 1]) - now)
-            rows.append(fmu.getReal(outputs))
-        fmu.terminate()
-    finally:
-        fmu.freeInstance()
-        shutil.rmtree(folder, ignore_errors=True)
+                fmu["impact_force_input"] = float(simulated.force[index])
+                fmu["vertical_load"] = float(simulated.vertical_load[index])
+            fmu.step(float(simulated.time[index]) - fmu.time)
+            rows.append(fmu.reals(outputs))
+        fmu.fmu.terminate()
     return Trajectory(simulated.time, *np.array(rows).T)
 
 

@@ -1,75 +1,98 @@
-"""One instance of an archive, driven through fmpy's plain FMI calls."""
+"""One instance of an archive, driven through fmpy's plain FMI calls: the project's one importer."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 
 class Unit:
     """One instance of a unit; variables by name."""
 
-    def __init__(self, path: Path, folder: Path, settings: dict[str, float] | None = None) -> None:
-        """Args: path: the archive; folder: to unpack it into; settings: parameters by name, set at each initialization,
-        those that the unit has."""
-        from fmpy import extract, read_model_description
+    def __init__(
+        self, path: Path, unzipped: Path, *, name: str | None = None, settings: Mapping[str, Any] | None = None
+    ) -> None:
+        """Args: path: the archive; unzipped: folder with its content; name: of the instance; settings: parameters by
+        name, set at each initialization, those that the unit has."""
+        from fmpy import read_model_description
         from fmpy.fmi2 import FMU2Slave
 
         description = read_model_description(str(path))
         self.variables = {v.name: v for v in description.modelVariables}
-        unzipped = folder / path.stem
-        if not unzipped.exists():
-            extract(str(path), unzipdir=str(unzipped))
         self.fmu = FMU2Slave(
             guid=description.guid,
             unzipDirectory=str(unzipped),
             modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=path.stem,
+            instanceName=name or path.stem,
         )
         self.fmu.instantiate()
         self.time = 0.0
-        self._settings = settings or {}
+        self._settings = {name: value for name, value in (settings or {}).items() if name in self.variables}
 
-    def initialize(self, settings: dict[str, float] | None = None) -> None:
-        self.time = 0.0
-        self.fmu.setupExperiment(startTime=0.0)
-        for name, value in (self._settings | (settings or {})).items():
-            if name in self.variables:
-                self.fmu.setReal([self.variables[name].valueReference], [value])
+    def initialize(self, start_time: float = 0.0, **values: Any) -> Self:
+        """Set the settings and parameters, and initialize at the time [s]."""
+        self.fmu.setupExperiment(startTime=start_time)
+        self.time = start_time
+        for name, value in (self._settings | values).items():
+            self[name] = value
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
+        return self
 
-    def step(self, size: float) -> None:
+    def again(self, start_time: float = 0.0, **values: Any) -> Self:
+        """Reset and initialize."""
+        self.fmu.reset()
+        return self.initialize(start_time, **values)
+
+    def step(self, size: float) -> Any:
+        """Go on by a step [s]."""
         self.fmu.doStep(self.time, size)
         self.time += size
 
-    def reset(self) -> None:
-        self.fmu.reset()
+    def __getitem__(self, name: str) -> Any:
+        return self._access(name, "get")([self.variables[name].valueReference])[0]
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        self._access(name, "set")([self.variables[name].valueReference], [value])
+
+    def _access(self, name: str, verb: str) -> Any:
+        return getattr(self.fmu, verb + self.variables[name].type)
+
+    def reals(self, names: Sequence[str]) -> list[float]:
+        """Values of variables that are numbers, in one call."""
+        return list(self.fmu.getReal([self.variables[name].valueReference for name in names]))
 
     def outputs(self) -> dict[str, Any]:
-        return {
-            name: getattr(self.fmu, f"get{v.type}")([v.valueReference])[0]
-            for name, v in self.variables.items()
-            if v.causality == "output"
-        }
+        """All outputs by name."""
+        return {name: self[name] for name, v in self.variables.items() if v.causality == "output"}
 
     def real_outputs(self) -> list[float]:
-        # The ratio of simulated to wall time is the only output that may differ from run to run.
-        chosen = [
-            v.valueReference
-            for name, v in self.variables.items()
-            if v.causality == "output" and v.type == "Real" and name != "time_ratio"
-        ]
-        return list(self.fmu.getReal(chosen))
+        """The outputs that are numbers and the same in every run: the ratio of simulated to wall time is not."""
+        return self.reals(
+            [
+                name
+                for name, v in self.variables.items()
+                if v.causality == "output" and v.type == "Real" and name != "time_ratio"
+            ]
+        )
+
+    def free(self) -> None:
+        """Give the instance back; its library stays loaded."""
+        self.fmu.fmi2FreeInstance(self.fmu.component)
 
 
 @contextlib.contextmanager
-def instance(path: Path, folder: Path, settings: dict[str, float] | None = None) -> Iterator[Unit]:
+def instance(path: Path, folder: Path, settings: Mapping[str, Any] | None = None) -> Iterator[Unit]:
     """An instance of the archive, unpacked into the folder, freed at the end."""
-    unit = Unit(path, folder, settings)
+    from fmpy import extract
+
+    unzipped = folder / path.stem
+    if not unzipped.exists():
+        extract(str(path), unzipdir=str(unzipped))
+    unit = Unit(path, unzipped, settings=settings)
     try:
         yield unit
     finally:
-        unit.fmu.fmi2FreeInstance(unit.fmu.component)
+        unit.free()

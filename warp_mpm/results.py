@@ -58,13 +58,13 @@ class Snapshot:
 class Snapshots:
     """The snapshots of a run, read one at a time. A context manager; `close` sets the file free."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: str | Path):
         """Open the file.
 
         Raises:
             ResultsError: it is missing or damaged.
         """
-        self._path = path
+        self._path = path = Path(path)
         try:
             self._file = h5py.File(path, "r", locking=False)
         except OSError as error:
@@ -141,21 +141,28 @@ class Snapshots:
 class Results:
     """A run folder, read as it is asked for."""
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
 
     @classmethod
     def open(cls, path: str | Path) -> Results:
         """The results in a run folder, of a run that ended or still goes on.
 
         Raises:
-            ResultsError: the folder is missing or is no run's.
+            ResultsError: the folder is missing, is no run's, or is of a version whose layout is another.
         """
         folder = Path(path)
         if not (folder / run_folder.RECORD).is_file():
             reason = "holds no run (run.json is missing)" if folder.is_dir() else "is no folder"
             raise ResultsError(f"{folder} {reason}.")
-        return cls(folder)
+        results = cls(folder)
+        layout = results.record.get("format")
+        if layout != run_folder.FORMAT:
+            raise ResultsError(
+                f"{folder / run_folder.RECORD} has format = {layout!r}, which another version wrote; "
+                f"this one reads {run_folder.FORMAT}."
+            )
+        return results
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -285,12 +292,13 @@ def _optional(what: str, package: str) -> Any:
         raise ModuleNotFoundError(missing(what, package, "xarray"), name=package) from None
 
 
-def read_time_series(path: Path) -> dict[str, Array]:
+def read_time_series(path: str | Path) -> dict[str, Array]:
     """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
 
     Raises:
         ResultsError: the file is missing or damaged, or a number in it is not finite.
     """
+    path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:

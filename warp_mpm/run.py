@@ -35,9 +35,6 @@ from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Scenario
 from warp_mpm.summary import summarize
 
-FORMAT = 1
-"""Version of the run folder's layout."""
-
 
 @dataclass(frozen=True)
 class RunProgress:
@@ -72,7 +69,7 @@ class RunOutcome:
 
 def run_scenario(
     scenario: Scenario,
-    out: Path,
+    out: str | Path,
     *,
     make_simulation: Callable[[Scenario], Any],
     force: bool = False,
@@ -97,6 +94,7 @@ def run_scenario(
         RunFolderError: `out` cannot be used; nothing was touched.
         Exception: whatever the simulation raises; the run's record then says `failed`.
     """
+    out = Path(out)
     RunFolder.check(out, force=force)
     preparing = time.perf_counter()
     simulation = make_simulation(scenario)
@@ -107,7 +105,7 @@ def run_scenario(
 
 
 def resume_run(
-    out: Path,
+    out: str | Path,
     *,
     make_simulation: Callable[[Scenario], Any],
     on_progress: Callable[[RunProgress], None] | None = None,
@@ -126,6 +124,7 @@ def resume_run(
         RunFolderError: there is nothing to go on with, or it is damaged; the sentence says so, nothing was touched.
         ScenarioError, ResultsError: the scenario or the record in the folder cannot be read.
     """
+    out = Path(out)
     results = Results.open(out)
     with RunFolder(out) as folder:
         folder.lock()
@@ -241,7 +240,7 @@ def _go_on(
     return outcome
 
 
-def evaluate(path: Path) -> dict[str, Any]:
+def evaluate(path: str | Path) -> dict[str, Any]:
     """Write the summary and the figures of a run folder from its records, and return the summary.
 
     Raises:
@@ -249,6 +248,7 @@ def evaluate(path: Path) -> dict[str, Any]:
     """
     from warp_mpm import plotting  # a third of a second, which the first step does not wait for
 
+    path = Path(path)
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
     taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
@@ -291,7 +291,7 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         with contextlib.suppress(metadata.PackageNotFoundError):
             used[package] = metadata.version(package)
     return {
-        "format": FORMAT,
+        "format": run_folder.FORMAT,
         "status": "running",
         "title": scenario.title,
         "scenario_file": origin,

@@ -207,6 +207,7 @@ class Simulation:
         self._last = self._before_last = self._totals()
         """Totals at the last two samples between which a step was made."""
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
+        self._scene_mark = saved.scene_mark(scenario.resolved())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
@@ -354,7 +355,7 @@ class Simulation:
             names,
             time=self.time,
             steps=self.steps,
-            barrier_velocity=self.barrier_velocity,
+            barrier_velocity=self.barrier_velocity or 0.0,
             numerics=self.scenario.numerics,
         )
 
@@ -426,14 +427,14 @@ class Simulation:
         return int(self._read("counters")[at.STEPS])
 
     @property
-    def barrier_displacement(self) -> float:
-        """Displacement of the barrier [m]."""
-        return self.body_displacement(BARRIER)[0] if self._barrier is not None else 0.0
+    def barrier_displacement(self) -> float | None:
+        """Displacement of the barrier [m]; None without a barrier."""
+        return self.body_displacement(BARRIER)[0] if self._barrier is not None else None
 
     @property
-    def barrier_velocity(self) -> float:
-        """Velocity of the barrier [m/s]."""
-        return self.body_velocity(BARRIER)[0] if self._barrier is not None else 0.0
+    def barrier_velocity(self) -> float | None:
+        """Velocity of the barrier [m/s]; None without a barrier."""
+        return self.body_velocity(BARRIER)[0] if self._barrier is not None else None
 
     def body_displacement(self, name: str) -> tuple[float, float]:
         """Displacement of a body along x and y since t = 0 [m].
@@ -563,8 +564,8 @@ class Simulation:
         barrier = BarrierNow()
         if self._barrier is not None:
             barrier = BarrierNow(
-                self.barrier_displacement,
-                self.barrier_velocity,
+                self.body_displacement(BARRIER)[0],
+                self.body_velocity(BARRIER)[0],
                 self._barrier_number("work"),
                 self._barrier_number("base_work"),
             )
@@ -651,7 +652,7 @@ class Simulation:
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
-        kept: dict[str, list[float]] = {"initial_momentum": self._initial_momentum}
+        kept: dict[str, Any] = {"initial_momentum": self._initial_momentum, "scene": self._scene_mark}
         for name, totals in (("last", self._last), ("before_last", self._before_last)):
             kept[f"{name}.numbers"] = [totals.time, totals.base_impulse, totals.seepage_power, totals.seepage_work]
             kept[f"{name}.reactions"] = totals.reactions

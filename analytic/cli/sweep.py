@@ -27,14 +27,15 @@ def plan(
     """
     with refusals():
         from analytic import sweep as scenes
-        from analytic.scene import read_scene
+        from analytic.scene import scene_of
+        from warp_mpm.scenario import Scenario
+        from warp_mpm.scenario_errors import read_json
 
-        read_scene(template)  # its errors name file and field
-        content = json.loads(template.read_text(encoding="utf-8-sig"))
-        if content["flow"]["formulation"] != "two_phase":
-            raise ValueError(
-                f"{template} has the formulation {content['flow']['formulation']!r}, it must be two_phase."
-            )
+        content = read_json(template)
+        scenario = Scenario.model_validate(content, source_name=str(template))
+        scene_of(scenario, str(template))  # its errors name file and field
+        if scenario.flow.formulation != "two_phase":
+            raise ValueError(f"{template} has the formulation {scenario.flow.formulation!r}, it must be two_phase.")
         planned = scenes.plan(content, count, seed)
         folder.mkdir(parents=True, exist_ok=True)
         for name, scene in planned.items():

@@ -3,7 +3,9 @@
 
 #include "unit.h"
 
-/* --- motion on a frictional base (sliding.py) ----------------------------------------------------------------- */
+#define DEGREE (3.14159265358979323846 / 180) /* [rad] */
+
+/* --- motion on a frictional base (analytic/sliding.py) ----------------------------------------------------------------- */
 
 static double first_stop(double velocity, double acceleration, double jerk) {
     double a = jerk / 2, b = acceleration, c = velocity;
@@ -11,9 +13,9 @@ static double first_stop(double velocity, double acceleration, double jerk) {
     double discriminant = b * b - 4 * a * c;
     if (discriminant < 0) return INFINITY;
     double q = -(b + copysign(sqrt(discriminant), b)) / 2;
-    double first = a != 0 && q / a > 0 ? q / a : INFINITY;
-    double second = q != 0 && c / q > 0 ? c / q : INFINITY;
-    return fmin(first, second);
+    double first = a != 0 ? q / a : INFINITY, second = q != 0 ? c / q : INFINITY;
+    /* A root of +0.0 is a positive one that underflowed: the motion starts with a velocity that is not nil. */
+    return fmin(copysign(1.0, first) > 0 ? first : INFINITY, copysign(1.0, second) > 0 ? second : INFINITY);
 }
 
 static double breakaway(double force, double force_rate, double friction, double friction_rate) {
@@ -29,11 +31,13 @@ static double wait_time(double direction, double force, double force_rate, doubl
     return rate > 0 ? -excess / rate : INFINITY;
 }
 
-static void slide(double *displacement, double *velocity, double left, double force, double force_rate,
+/* Slide for a duration, under a force and a friction that are linear in time. */
+static void slide(double *displacement, double *velocity, double duration, double force, double force_rate,
                   double friction, double friction_rate, double mass) {
-    while (left > 0) {
+    double t = 0;
+    while (t < duration) {
         double direction = copysign(1.0, *velocity);
-        int settled = 0;
+        int waited = 0;
         if (*velocity == 0) {
             direction = breakaway(force, force_rate, friction, friction_rate);
             if (direction == 0) {
@@ -41,29 +45,30 @@ static void slide(double *displacement, double *velocity, double left, double fo
                 double backward = wait_time(-1, force, force_rate, friction, friction_rate);
                 double wait = backward < forward ? backward : forward;
                 direction = backward < forward ? -1 : 1;
-                if (wait >= left) return;
+                if (t + wait >= duration) return;
+                t += wait;
                 force += wait * force_rate;
                 friction += wait * friction_rate;
-                left -= wait;
-                settled = 1;
+                waited = 1; /* it sets out with force and friction equal, whatever rounding says */
             }
         }
-        double acceleration = settled ? 0.0 : (force - direction * friction) / mass;
+        double acceleration = waited ? 0.0 : (force - direction * friction) / mass;
         double jerk = (force_rate - direction * friction_rate) / mass;
-        double run = fmin(first_stop(*velocity, acceleration, jerk), left);
-        *displacement += run * (*velocity + run * (acceleration / 2 + run * jerk / 6));
-        if (run >= left) {
-            *velocity += run * (acceleration + run * jerk / 2);
-            return;
-        }
-        *velocity = 0;
-        force += run * force_rate;
-        friction += run * friction_rate;
-        left -= run;
+        double slip = first_stop(*velocity, acceleration, jerk);
+        int stops = t + slip < duration;
+        double until = stops ? t + slip : duration, u = until - t;
+        *displacement += u * (*velocity + u * (acceleration / 2 + u * jerk / 6));
+        *velocity = stops ? 0 : *velocity + u * (acceleration + u * jerk / 2);
+        if (!stops) return;
+        t = until;
+        force += slip * force_rate;
+        friction += slip * friction_rate;
+        /* What stops a body cannot drive it on: keeps rounding from setting it going again at the same instant. */
+        force = direction * fmin(direction * force, friction);
     }
 }
 
-/* --- the closed form (impact.py); times count from arrival --------------------------------------------------------- */
+/* --- the closed form (analytic/impact.py); times count from arrival --------------------------------------------------------- */
 
 typedef struct {
     double start, stop, force, rate;
@@ -78,8 +83,23 @@ static void force_pieces(const Impact *impact, double peak_force, Piece pieces[4
     pieces[3] = (Piece){T2, INFINITY, 0, 0};
 }
 
-/* Carry the barrier from the time `start` to `stop` under the triangle of force and the loads from outside. */
-static void carry(const Impact *impact, double peak_force, double start, double stop, double external, double weight,
+/* What acts on the barrier beside the impact: along the base, and normal to it. */
+typedef struct {
+    double pushing, pressing;
+} Loads;
+
+static Loads loads_on(const Impact *impact, double external, double vertical) {
+    double weight = impact->mass * impact->gravity;
+    return (Loads){external + weight * impact->sine, fmax(weight * impact->cosine + vertical, 0)};
+}
+
+/* g (tan(delta_b) cos(theta) - sin(theta)), with which a sliding barrier slows down. */
+static double friction_deceleration(const Impact *impact) {
+    return impact->fixed ? 0 : impact->gravity * (impact->tangent * impact->cosine - impact->sine);
+}
+
+/* Carry the barrier from the time `start` to `stop` under the triangle of force and the loads. */
+static void carry(const Impact *impact, double peak_force, double start, double stop, Loads loads,
                   double *displacement, double *velocity) {
     Piece pieces[4];
     if (impact->fixed) return;
@@ -89,12 +109,10 @@ static void carry(const Impact *impact, double peak_force, double start, double 
         if (!(to > from)) continue;
         double force = rate != 0 ? pieces[i].force + (from - pieces[i].start) * rate : pieces[i].force;
         double share = impact->vertical_load_ratio;
-        slide(displacement, velocity, to - from, force + external, rate, impact->tangent * (weight + share * force),
-              impact->tangent * share * rate, impact->mass);
+        slide(displacement, velocity, to - from, force + loads.pushing, rate,
+              impact->tangent * (loads.pressing + share * force), impact->tangent * share * rate, impact->mass);
     }
 }
-
-static double weight_of(const Impact *impact) { return impact->mass * impact->gravity; }
 
 static double force_at(const Impact *impact, double since) {
     double T1 = impact->rise_time, T2 = impact->duration, peak = impact->peak_force;
@@ -119,11 +137,11 @@ static double printed_flow_velocity(const Impact *impact, double since) {
     if (since <= 0) return impact->speed;
     if (since <= T2) return impact->speed + since * since * jerk / 2;
     if (impact->fixed) return 0;
-    return fmax(common_velocity(impact) - (since - T2) * impact->gravity * impact->tangent, 0);
+    return fmax(common_velocity(impact) - (since - T2) * friction_deceleration(impact), 0);
 }
 
 static void printed_barrier(const Impact *impact, double since, double *displacement, double *velocity) {
-    double T2 = impact->duration, deceleration = impact->gravity * impact->tangent;
+    double T2 = impact->duration, deceleration = friction_deceleration(impact);
     double jerk = 2 * impact->impulse / (T2 * T2) / impact->mass, v20 = impact->initial_velocity;
     double u = fmin(since, T2);
     *velocity = v20 + u * (-deceleration + u * jerk / 2);
@@ -155,7 +173,7 @@ static void follow_closed_form(Model *model, double time) {
     } else if (impact->variant == VARIANT_AS_PRINTED && !impact->fixed) {
         printed_barrier(impact, since, &model->displacement, &model->velocity);
     } else {
-        carry(impact, impact->peak_force, 0, since, 0, weight_of(impact), &model->displacement, &model->velocity);
+        carry(impact, impact->peak_force, 0, since, loads_on(impact, 0, 0), &model->displacement, &model->velocity);
     }
 }
 
@@ -164,11 +182,11 @@ static double momentum_closed_impulse(const Impact *impact) {
     double stopping = impact->flow_mass * impact->speed;
     if (impact->fixed) return stopping;
     double share = 1 - impact->vertical_load_ratio * impact->tangent, driven_mass = impact->mass / share;
-    double T2 = impact->duration, deceleration = impact->gravity * impact->tangent;
+    double T2 = impact->duration, deceleration = friction_deceleration(impact);
     double R = impact->mass * deceleration / share;
     double reduced_mass = impact->flow_mass / (1 + impact->flow_mass / driven_mass);
     double displacement = 0, velocity = impact->initial_velocity;
-    carry(impact, 2 * stopping / T2, 0, T2, 0, weight_of(impact), &displacement, &velocity);
+    carry(impact, 2 * stopping / T2, 0, T2, loads_on(impact, 0, 0), &displacement, &velocity);
     if (velocity <= 0) return stopping;
     double never_at_rest = reduced_mass * (impact->speed - impact->initial_velocity + deceleration * T2);
     double ratio = R * T2 / (2 * never_at_rest), rise_ratio = impact->rise_time / T2;
@@ -179,7 +197,7 @@ static double momentum_closed_impulse(const Impact *impact) {
 
 /* --- the unit (barrier_sliding.py) ---------------------------------------------------------------------------------- */
 
-static int phase_of(const Model *model, double time, double external, double friction) {
+static int phase_of(const Model *model, double time, Loads loads, double friction) {
     const Impact *impact = &model->impact;
     double since = time - impact->arrival;
     int impacting = model->force > 0, moving = model->velocity != 0;
@@ -195,15 +213,15 @@ static int phase_of(const Model *model, double time, double external, double fri
     }
     if (!impacting) return PHASE_INERTIA;
     double direction = model->integrated ? copysign(1.0, model->velocity) : 1;
-    return direction * (model->force + external) > friction ? PHASE_ACCELERATION : PHASE_DECELERATION;
+    return direction * (model->force + loads.pushing) > friction ? PHASE_ACCELERATION : PHASE_DECELERATION;
 }
 
-static void write_outputs(Unit *unit, double time, double external, double weight) {
+static void write_outputs(Unit *unit, double time, Loads loads) {
     Model *model = &unit->state.model;
     const Impact *impact = &model->impact;
     double *values = unit->state.values, since = time - impact->arrival;
     double share = impact->force_is_input ? 0 : impact->vertical_load_ratio;
-    double friction = impact->tangent * (weight + share * model->force);
+    double friction = impact->tangent * (loads.pressing + share * model->force);
     double v1 = impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input
                     ? printed_flow_velocity(impact, since)
                     : impact->speed - (impact->force_is_input ? model->impulse : impulse_until(impact, since)) /
@@ -217,7 +235,7 @@ static void write_outputs(Unit *unit, double time, double external, double weigh
     values[FLOW_VELOCITY] = v1;
     values[FLOW_KINETIC_ENERGY] = impact->flow_mass * v1 * v1 / 2;
     values[BARRIER_KINETIC_ENERGY] = impact->fixed ? 0 : impact->mass * v2 * v2 / 2;
-    values[IMPACT_PHASE] = phase_of(model, time, external, friction);
+    values[IMPACT_PHASE] = phase_of(model, time, loads, friction);
 }
 
 static int advance(Unit *unit, double end) {
@@ -225,30 +243,31 @@ static int advance(Unit *unit, double end) {
     const Impact *impact = &model->impact;
     const double *values = unit->state.values;
     double external = values[EXTERNAL_FORCE], load = values[VERTICAL_LOAD], force = values[IMPACT_FORCE_INPUT];
-    double start = unit->state.time, weight = fmax(weight_of(impact) + load, 0);
+    double start = unit->state.time;
+    Loads loads = loads_on(impact, external, load);
     int acted = external != 0 || load != 0;
     if (acted && impact->variant == VARIANT_AS_PRINTED)
         return refuse(unit, "variant is 3 (as_printed), which is a set of functions of time: external_force and "
                             "vertical_load must be 0, or choose 1 (stick_slip).");
     if (!model->integrated && !acted) {
         follow_closed_form(model, end);
-        write_outputs(unit, end, 0, weight_of(impact));
+        write_outputs(unit, end, loads);
         return 1;
     }
     model->integrated = 1;
     if (impact->force_is_input) {
         if (!impact->fixed)
-            slide(&model->displacement, &model->velocity, end - start, force + external, 0, impact->tangent * weight,
-                  0, impact->mass);
+            slide(&model->displacement, &model->velocity, end - start, force + loads.pushing, 0,
+                  impact->tangent * loads.pressing, 0, impact->mass);
         model->force = force;
         model->impulse += force * (end - start);
         model->peak_force = fmax(model->peak_force, force);
     } else {
-        carry(impact, impact->peak_force, start - impact->arrival, end - impact->arrival, external, weight,
+        carry(impact, impact->peak_force, start - impact->arrival, end - impact->arrival, loads,
               &model->displacement, &model->velocity);
         model->force = force_at(impact, end - impact->arrival);
     }
-    write_outputs(unit, end, external, weight);
+    write_outputs(unit, end, loads);
     return 1;
 }
 
@@ -274,9 +293,15 @@ int unit_start(Unit *unit) {
     impact->mass = values[BARRIER_MASS];
     impact->tangent = impact->fixed ? 0 : values[BASE_FRICTION];
     impact->gravity = values[GRAVITY];
+    impact->cosine = cos(values[SLOPE] * DEGREE);
+    impact->sine = sin(values[SLOPE] * DEGREE);
     impact->vertical_load_ratio = values[VERTICAL_LOAD_RATIO];
     if (impact->variant == VARIANT_AS_PRINTED && impact->vertical_load_ratio != 0)
         return refuse(unit, "vertical_load_ratio is %g, it must be 0 with as_printed.", impact->vertical_load_ratio);
+    double steepest = fabs(tan(values[SLOPE] * DEGREE));
+    if (!impact->fixed && steepest > 0 && impact->tangent <= steepest)
+        return refuse(unit, "base_friction is %g, on a slope of %g degrees it must be above %.4g, else the barrier "
+                            "slides by its own weight.", impact->tangent, values[SLOPE], steepest);
     if (impact->vertical_load_ratio * impact->tangent >= 1)
         return refuse(unit, "vertical_load_ratio is %g, it must be in [0, %g).", impact->vertical_load_ratio,
                       1 / impact->tangent);
@@ -296,7 +321,7 @@ int unit_start(Unit *unit) {
         return advance(unit, unit->state.time);
     }
     follow_closed_form(model, unit->state.time);
-    write_outputs(unit, unit->state.time, 0, weight_of(impact));
+    write_outputs(unit, unit->state.time, loads_on(impact, 0, 0));
     return 1;
 }
 

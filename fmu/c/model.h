@@ -6,6 +6,7 @@ typedef struct {
     int fixed, force_is_input, variant;
     double flow_mass, speed, flow_height;
     double mass, tangent, gravity, vertical_load_ratio, initial_velocity;
+    double cosine, sine;                 /* of the slope */
     double arrival, duration, rise_time; /* arrival time, T2, T1 [s] */
     double impulse, peak_force;          /* J [N s/m], F_peak [N/m] */
 } Impact;

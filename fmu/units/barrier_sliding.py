@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from analytic.impact import PHASES, STANDARD_GRAVITY, VARIANTS, Impact
+from analytic.sliding import slide
 
 from .interface import (
+    DEGREE,
     JOULE_PER_METRE,
     KILOGRAM_PER_METRE,
     METRE,
@@ -22,7 +24,6 @@ from .interface import (
     Variable,
 )
 from .slave import UnitError, UnitSlave
-from .sliding import slide
 
 _VARIANT_TEXTS = {
     "stick_slip": "The barrier slides only while the force exceeds its base friction",
@@ -50,6 +51,9 @@ FORCE_SOURCE = Choice(
 
 FORCE_LIMIT = 1e9
 """Largest force that an input may bring [N/m], far beyond any flow: a number above it is a mistake."""
+
+STEEPEST = 89.0
+"""Largest slope [degrees], up or down; a barrier that may slide rests on none that is steeper than its friction."""
 
 
 def _parameter(name: str, description: str, start: float, **rest: Any) -> Variable:
@@ -151,6 +155,15 @@ VARIABLES = (
         open_minimum=True,
         nominal=10.0,
     ),
+    _parameter(
+        "slope",
+        "Angle by which the ground falls in the direction of the flow; forces and motions are along the ground",
+        0.0,
+        unit=DEGREE,
+        minimum=-STEEPEST,
+        maximum=STEEPEST,
+        nominal=10.0,
+    ),
     Variable("variant", "parameter", VARIANT.description, "Integer", start=1, choice=VARIANT),
     Variable("impact_force_source", "parameter", FORCE_SOURCE.description, "Integer", start=1, choice=FORCE_SOURCE),
     _force_input(
@@ -159,7 +172,7 @@ VARIABLES = (
     ),
     _force_input(
         "vertical_load",
-        "Downward load on the barrier per metre of width beside its weight; it raises the base friction",
+        "Load on the barrier, normal to its base, per metre of width beside its weight; it raises the base friction",
     ),
     _force_input(
         "impact_force_input",
@@ -263,17 +276,19 @@ class SlidingBarrier:
             return
         self.integrated = True
         impact = self.impact
-        tangent = impact.base_friction or 0.0
-        weight = max((impact.barrier_mass or 0.0) * impact.gravity + loads.vertical_load, 0.0)
+        tangent, angle = impact.base_friction or 0.0, math.radians(impact.slope)
+        weight = (impact.barrier_mass or 0.0) * impact.gravity
+        pressing = max(weight * math.cos(angle) + loads.vertical_load, 0.0)
+        pushing = loads.external_force + weight * math.sin(angle)
         share = 0.0 if self.force_is_input else impact.vertical_load_ratio
         for duration, force, rate in () if impact.fixed else self._force_pieces(end, loads):
             self.displacement, self.velocity = slide(
                 self.displacement,
                 self.velocity,
                 duration,
-                force + loads.external_force,
+                force + pushing,
                 rate,
-                tangent * (weight + share * force),
+                tangent * (pressing + share * force),
                 tangent * share * rate,
                 impact.barrier_mass or math.inf,
             )
@@ -284,7 +299,7 @@ class SlidingBarrier:
         else:
             self.force = impact.force(end)
         self.time = end
-        self.phase = self._phase(self.force + loads.external_force, tangent * (weight + share * self.force))
+        self.phase = self._phase(self.force + pushing, tangent * (pressing + share * self.force))
 
     def _force_pieces(self, end: float, loads: Loads) -> list[tuple[float, float, float]]:
         """Duration, impact force at the start and its rate of each piece of the step in which it is linear."""
@@ -347,6 +362,7 @@ class BarrierSlidingSlave(UnitSlave):
                     "rise_ratio",
                     "vertical_load_ratio",
                     "gravity",
+                    "slope",
                 )
             },
             barrier_mass=None if fixed else self["barrier_mass"],

@@ -10,12 +10,15 @@ Value = float | int | bool | str
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of measurement: its exponents of kg, m and s, and the display unit offered beside it."""
+    """A unit of measurement: its exponents of kg, m, s and rad, and the display unit offered beside it."""
 
     name: str
     kg: int = 0
     m: int = 0
     s: int = 0
+    rad: int = 0
+    factor: float = 1.0
+    """Value in the base units per value in this unit."""
     display_name: str | None = None
     display_factor: float = 1.0
     """Value in the display unit per value in this unit."""
@@ -32,6 +35,7 @@ NEWTON_PER_SQUARE_METRE = Unit("N/m2", kg=1, m=-1, s=-2, display_name="kN/m2", d
 JOULE_PER_METRE = Unit("J/m", kg=1, m=1, s=-2, display_name="kJ/m", display_factor=1e-3)
 PASCAL = Unit("Pa", kg=1, m=-1, s=-2, display_name="kPa", display_factor=1e-3)
 CUBIC_METRE_PER_METRE = Unit("m3/m", m=2)
+DEGREE = Unit("deg", rad=1, factor=math.pi / 180)
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,9 @@ def _unit_definitions(root: Element, interface: Interface) -> None:
     for name in sorted(units):
         unit = units[name]
         element = SubElement(definitions, "Unit", {"name": name})
-        exponents = {"kg": unit.kg, "m": unit.m, "s": unit.s}
-        SubElement(element, "BaseUnit", {base: str(power) for base, power in exponents.items() if power})
+        exponents = {"kg": unit.kg, "m": unit.m, "s": unit.s, "rad": unit.rad}
+        base = {name: str(power) for name, power in exponents.items() if power}
+        SubElement(element, "BaseUnit", base | ({} if unit.factor == 1 else {"factor": _number(unit.factor)}))
         if unit.display_name:
             SubElement(element, "DisplayUnit", {"name": unit.display_name, "factor": _number(unit.display_factor)})
 

@@ -202,7 +202,7 @@ def test_predict_refuses_in_one_sentence(arguments: list[str], sentence: str) ->
 
 def test_predict_names_what_is_missing(tmp_path: Path) -> None:
     assert refusal("predict", "--tau", "0.3").startswith("flow_mass is missing, give --flow-mass or a scenario")
-    assert "none.json cannot be read" in refusal("predict", str(tmp_path / "none.json"))
+    assert "none.json: Cannot read the scenario" in refusal("predict", str(tmp_path / "none.json"))
     assert refusal("predict", *FIG_9[:2], *FIG_9[4:10]).startswith("barrier_mass is missing")
     s1max = [*FIG_9[:-4], "--tau", "0.35", "--s1max", "15.1"]
     assert refusal("predict", *s1max).startswith("--s1max = 15.1 is not allowed; it must be a number in (0, 15]")

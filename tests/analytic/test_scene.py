@@ -6,9 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+from analytic.cli import app as closed_form
 from analytic.scene import SceneError, read_scene, scene_of
+from fmu.__main__ import app as fmu
 from warp_mpm.scenario import Scenario, Trapezoid
+from warp_mpm.scenario_errors import ScenarioError
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.json"))
 
@@ -17,7 +21,7 @@ SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.json"))
 def test_every_shipped_scenario_reads_as_in_the_simulator(path: Path) -> None:
     scenario = Scenario.load(path)
     if scenario.barrier is None:
-        with pytest.raises(SceneError, match=r"barrier\.\S+ is missing"):
+        with pytest.raises(SceneError, match=r"barrier is null, the closed form needs one"):
             read_scene(path)
         return
     scene = read_scene(path)
@@ -25,7 +29,7 @@ def test_every_shipped_scenario_reads_as_in_the_simulator(path: Path) -> None:
     assert scene.flow_length == pytest.approx(scenario.flow.equivalent_length)
     assert scene.flow_height == pytest.approx(scenario.flow.depth)
     assert scene.speed == scenario.flow.velocity_m_per_s[0]
-    assert scene.barrier_mass == pytest.approx(scenario.barrier.mass)
+    assert scene.barrier_mass == scenario.barrier.mass
     assert scene.gravity == scenario.gravity.acceleration_m_per_s2
     if isinstance(scenario.barrier.shape, Trapezoid):
         assert scene.face_angle == pytest.approx(scenario.barrier.shape.built_face_angle_deg)
@@ -42,19 +46,23 @@ def test_the_resolved_scenario_of_a_run_folder_is_read(tmp_path: Path) -> None:
     assert read_scene(tmp_path) == read_scene(source)
 
 
-def scenario(**changes: Any) -> dict[str, Any]:
-    """A scenario with the fields at the dotted paths replaced; ``None`` removes one."""
-    content = json.loads(next(path for path in SCENARIOS if path.stem == "set_iib").read_text())
+def content(**changes: Any) -> dict[str, Any]:
+    """Content of a scenario file with the fields at the paths replaced; ``None`` removes one."""
+    found = json.loads(next(path for path in SCENARIOS if path.stem == "set_iib").read_text())
     for path, value in changes.items():
         *groups, last = path.split("/")
-        at = content
+        at = found
         for group in groups:
             at = at[group]
         if value is None:
             del at[last]
         else:
             at[last] = value
-    return content
+    return found
+
+
+def scenario(**changes: Any) -> Scenario:
+    return Scenario.model_validate(content(**changes))
 
 
 def test_a_polygon_is_measured() -> None:
@@ -106,19 +114,15 @@ def test_the_base_soil_s_friction_angle_counts_by_four_fifths() -> None:
     assert found.barrier_density == pytest.approx(2000 * 5e4 / scene_of(scenario()).barrier_mass)
 
 
+PRESCRIBED = {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [1.0]}
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"flow/shape/depth_m": None}, r"flow\.shape\.depth_m is missing\."),
-        ({"flow/shape/depth_m": "3"}, r"flow\.shape\.depth_m is '3', it must be a finite number"),
         ({"flow/velocity_m_per_s": [-1, 0]}, r"velocity_m_per_s\[0\] is -1, the flow must move towards"),
-        ({"flow/velocity_m_per_s": 10}, r"velocity_m_per_s is 10, it must be a list of 2 finite numbers"),
-        ({"barrier": None}, r"barrier\.\S+ is missing"),
-        ({"barrier/motion": {"kind": "prescribed"}}, r"barrier\.motion\.kind is 'prescribed', the closed form knows"),
-        ({"barrier/shape/height_m": None, "barrier/shape/base_width_m": None}, r"barrier\.shape needs three of"),
-        ({"flow/shape": {"kind": "ball"}}, r"flow\.shape\.kind is 'ball'"),
-        ({"flow/shape": {"kind": "polygon", "vertices_m": [[0, 0], [1, 1]]}}, r"at least three corners"),
-        ({"flow/shape": {"kind": "polygon", "vertices_m": [[0, 0], [1, "a"], 3]}}, r"vertices_m holds \[1, 'a'\]"),
+        ({"barrier": None}, r"barrier is null, the closed form needs one"),
+        ({"barrier/motion": PRESCRIBED}, r"barrier\.motion\.kind is 'prescribed', the closed form knows"),
     ],
 )
 def test_a_scene_without_an_answer_is_refused(changes: dict[str, Any], sentence: str) -> None:
@@ -128,15 +132,43 @@ def test_a_scene_without_an_answer_is_refused(changes: dict[str, Any], sentence:
 
 
 def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"none\.json cannot be read: No such file"):
+    with pytest.raises(ScenarioError, match=r"none\.json: Cannot read the scenario: No such file"):
         read_scene(tmp_path / "none.json")
     broken = tmp_path / "broken.json"
     broken.write_text("{")
-    with pytest.raises(SceneError, match=r"broken\.json is no valid JSON"):
-        read_scene(broken)
-    broken.write_bytes(b"\xff\xfe{")
-    with pytest.raises(SceneError, match=r"broken\.json is no valid JSON"):
+    with pytest.raises(ScenarioError, match=r"broken\.json: The file is no valid JSON"):
         read_scene(broken)
     broken.write_text("[1, 2]")
-    with pytest.raises(SceneError, match=r"flow\.material\.porosity is missing"):
+    with pytest.raises(ScenarioError, match=r"broken\.json: The scenario = \[1, 2\] is not allowed"):
         read_scene(broken)
+
+
+TYPOS = {
+    "gravity/tilt_degg": 5.0,
+    "flow/material/porosity": 1.4,
+    "flow/material/grain_density_kg_per_m3": -1000.0,
+    "barrier/shape/crest_width_m": 50.0,
+    "flow/shape/depth_m": "3",
+    "output": None,
+}
+
+
+@pytest.mark.parametrize("path", TYPOS)
+def test_every_command_refuses_a_file_as_the_simulator_does(path: str, tmp_path: Path) -> None:
+    file = tmp_path / "typo.json"
+    file.write_text(json.dumps(content(**{path: TYPOS[path]})))
+    with pytest.raises(ScenarioError) as refusal:
+        Scenario.load(file)
+    analytic = [
+        ["predict", str(file)],
+        ["compare", str(file)],
+        ["design", str(file), "--limit", "1"],
+        ["sweep", "plan", str(file), str(tmp_path / "sweep")],
+    ]
+    units = [["build", "--scenario", str(file), "--out", str(tmp_path)], ["check", str(file), "--out", str(tmp_path)]]
+    for app, commands in ((closed_form, analytic), (fmu, units)):
+        for command in commands:
+            result = CliRunner().invoke(app, command)
+            assert (result.exit_code, result.stdout) == (2, ""), command
+            assert result.stderr.strip() == str(refusal.value), command
+    assert list(tmp_path.iterdir()) == [file]

@@ -13,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 
 from analytic.impact import PHASES, VARIANTS, Impact
-from fmu.units.sliding import slide
+from analytic.sliding import slide
 
 Open = Callable[[str], Any]
 BOTH = pytest.mark.parametrize("unit", ["BarrierSliding", "BarrierSlidingC"])
@@ -51,6 +51,9 @@ def random_parameters(draw: random.Random) -> dict[str, Any]:
         parameters["s1max"] = draw.uniform(0.05, 1) * parameters["flow_length"]
     if parameters["variant"] == 3:
         parameters["vertical_load_ratio"] = 0.0  # the paper's formulas have no such term
+    steepest = math.degrees(math.atan(parameters["base_friction"]))
+    if steepest and draw.random() < 0.6:
+        parameters["slope"] = draw.uniform(-0.95, 0.95) * steepest
     return parameters
 
 
@@ -106,6 +109,71 @@ def test_unit_is_the_closed_form(unit: str, open_unit: Open) -> None:
                 assert error < 1e-12, (name, parameters, time, found[name], value)
                 worst = max(worst, error)
     assert worst < 1e-12
+
+
+def test_c_moves_as_python_under_loads(open_unit: Open) -> None:
+    """Random parameters, slopes and loads from outside, the impact force from the closed form or an input."""
+    draw, python, c = random.Random(8), open_unit("BarrierSliding"), open_unit("BarrierSlidingC")
+    python.initialize()
+    c.initialize()
+    phases = set()
+    for _ in range(200):
+        parameters = random_parameters(draw)
+        parameters["variant"] = draw.choice([1, 2])
+        parameters["impact_force_source"] = draw.choice([1, 1, 2])
+        impact = impact_of({name: value for name, value in parameters.items() if name != "impact_force_source"})
+        for host in (python, c):
+            host.again(**parameters)
+        weight = parameters["barrier_mass"] * parameters["gravity"]
+        speed, reach = impact.speed, 0.0
+        for _ in range(8):
+            loads = {
+                "external_force": draw.choice([0.0, draw.uniform(-2, 2) * weight]),
+                "vertical_load": draw.choice([0.0, draw.uniform(-0.5, 2) * weight]),
+                "impact_force_input": draw.uniform(0, 2) * weight,
+            }
+            size = draw.uniform(0, impact.duration / 2)
+            for host in (python, c):
+                for name, value in loads.items():
+                    host[name] = value
+                host.run(size)
+            found, expected = c.outputs(), python.outputs()
+            phases.add(expected["impact_phase"])
+            assert found["impact_phase"] == expected["impact_phase"], (parameters, loads)
+            # The largest velocity and way that the loads could have led to are the scales of rounding.
+            speed += size * (6 * weight + impact.peak_force) / parameters["barrier_mass"]
+            reach += size * speed
+            assert found["barrier_velocity"] == pytest.approx(expected["barrier_velocity"], abs=1e-12 * speed)
+            assert found["barrier_displacement"] == pytest.approx(expected["barrier_displacement"], abs=1e-12 * reach)
+    assert len(phases) == len(PHASES)
+
+
+@BOTH
+@pytest.mark.parametrize("slope", [12.0, -12.0])
+def test_slope_against_small_steps(unit: str, slope: float, open_unit: Open) -> None:
+    """Pushed up and down a slope by forces from outside, which have to overcome the weight along it, too."""
+    mass, tangent, load = 8e4, 0.4, 3e4
+    along = mass * 9.81 * math.sin(math.radians(slope))
+    friction = tangent * (mass * 9.81 * math.cos(math.radians(slope)) + load)
+    changes = {"barrier_mass": mass, "base_friction": tangent, "slope": slope, "impact_force_source": 2}
+    host = open_unit(unit).initialize(**(PAPER | changes))
+    host["vertical_load"] = load
+    place = (0.0, 0.0)
+    for pushed in (1.3 * friction, 0.0, -1.3 * friction, 0.0):
+        host["external_force"] = pushed - along
+        host.run(1.0)
+        place = reference_slide(place, 1.0, lambda t, pushed=pushed: pushed, friction, mass)
+        assert (host["barrier_displacement"], host["barrier_velocity"]) == pytest.approx(place, abs=1e-4)
+    host["external_force"] = 0.0  # the base holds it against its weight
+    host.run(5.0)
+    assert host["barrier_velocity"] == 0.0
+    rest = host["barrier_displacement"]
+    host["external_force"] = friction - along - 1.0
+    host.run(1.0)
+    assert host["barrier_displacement"] == rest
+    host["external_force"] = friction - along + 1.0
+    host.run(1.0)
+    assert host["barrier_displacement"] - rest == pytest.approx(0.5 / mass, rel=1e-6)
 
 
 @BOTH
@@ -334,6 +402,8 @@ REFUSED = [
     ({"barrier_initial_velocity": 12.0}, "barrier_initial_velocity is 12", "[0, 10)"),
     ({"vertical_load_ratio": 4.0}, "vertical_load_ratio is 4", "[0, 3.44828)"),
     ({"vertical_load_ratio": 0.5, "variant": 3}, "vertical_load_ratio is 0.5", "0 with as_printed"),
+    ({"slope": 95.0}, "slope is 95 deg", "[-89, 89] deg"),
+    ({"slope": -20.0}, "base_friction is 0.29, on a slope of -20 degrees it must be above 0.364", "its own weight"),
     ({"external_force": math.nan}, "external_force is nan", "[-1e+09, 1e+09] N/m"),
 ]
 

@@ -8,6 +8,8 @@ from typer.testing import CliRunner
 
 from warp_mpm.cli import app
 from warp_mpm.hard_cases.measure import measure
+from warp_mpm.results import Results
+from warp_mpm.run import run_scenario
 from warp_mpm.simulation import Simulation, SimulationDiverged
 
 
@@ -86,6 +88,39 @@ def test_a_state_goes_back_and_on_bit_for_bit(coarse_case_1, simulation):
         again.restore_state(state)
         again.advance(0.5)
         assert again.save_state() == expected
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"flow.material.young_modulus_Pa": 3e6},
+        {"flow.material.friction_angle_deg": 25.0},
+        {"barrier.motion.base_friction": 0.5},
+        {"gravity.tilt_deg": 1.0},
+    ],
+)
+def test_another_scene_s_state_is_refused(coarse_case_1, simulation, changes):
+    """Though its arrays are of the same sizes."""
+    other = Simulation(coarse_case_1.replaced(changes))
+    before = other.save_state()
+    with pytest.raises(ValueError, match="it belongs to another scene"):
+        other.restore_state(simulation.save_state())
+    assert other.save_state() == before
+
+
+def test_a_state_does_not_depend_on_what_is_recorded(coarse_case_1, simulation):
+    other = Simulation(coarse_case_1.replaced({"title": "The same", "output.end_time_s": 9.0}))
+    other.restore_state(simulation.save_state())
+    assert other.save_state() == simulation.save_state()
+
+
+def test_a_scene_without_barrier_has_no_place_of_it(load_scene, tmp_path):
+    scenario = load_scene("case_1", barrier=None, **{"numerics.spacing_m": 1.0, "output.end_time_s": 0.01})
+    simulation = Simulation(scenario)
+    assert (simulation.barrier_displacement, simulation.barrier_velocity) == (None, None)
+    run_scenario(scenario, tmp_path / "run", make_simulation=Simulation)
+    with Results.open(tmp_path / "run").snapshots as snapshots:
+        assert [snapshot.barrier_displacement for snapshot in snapshots] == [None] * len(snapshots)
 
 
 @pytest.mark.parametrize(

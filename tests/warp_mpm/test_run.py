@@ -4,12 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from warp_mpm import plotting
+from warp_mpm.cli import app
 from warp_mpm.recording import run_folder
-from warp_mpm.recording.run_folder import RunFolderError
-from warp_mpm.results import Results, ResultsError
-from warp_mpm.run import evaluate, run_scenario
+from warp_mpm.recording.run_folder import RunFolder, RunFolderError
+from warp_mpm.report import write_report
+from warp_mpm.results import Results, ResultsError, Snapshots
+from warp_mpm.run import evaluate, resume_run, run_scenario
 from warp_mpm.scenario import Scenario
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -156,6 +159,10 @@ def test_pressure_figure_shows_the_times_asked_for(tmp_path, coarse_case_1, flyi
     ("spoil", "message"),
     [
         (lambda path: (path / run_folder.RECORD).unlink(), "run.json is missing"),
+        (
+            lambda path: (path / run_folder.RECORD).write_text('{"format": 2, "status": "finished"}'),
+            "run.json has format = 2, which another version wrote; this one reads 1",
+        ),
         (lambda path: (path / run_folder.SUMMARY).write_text("{"), "summary.json cannot be read"),
         (lambda path: (path / run_folder.SUMMARY).write_text("[]"), "does not hold a group of fields"),
         (lambda path: (path / run_folder.SUMMARY).unlink(), "summary.json is missing"),
@@ -166,6 +173,32 @@ def test_spoilt_run_folder(tmp_path, coarse_case_1, flying_points, spoil, messag
     spoil(tmp_path)
     with pytest.raises(ResultsError, match=message):
         _ = Results.open(tmp_path).summary
+
+
+def test_a_string_is_a_path(tmp_path, coarse_case_1, flying_points):
+    folder = str(tmp_path / "run")
+    run_scenario(coarse_case_1, folder, make_simulation=flying_points)
+    outcome = resume_run(folder, make_simulation=flying_points)
+    assert outcome.path == tmp_path / "run"
+    assert outcome.finished
+    assert evaluate(folder) == outcome.summary
+    assert Results(folder).summary == outcome.summary
+    assert len(Snapshots(folder + "/" + run_folder.SNAPSHOTS)) > 1
+    assert RunFolder(folder).path == tmp_path / "run"
+    write_report([Results.open(folder)], folder + "/report.html")
+    assert (tmp_path / "run" / "report.html").stat().st_size > 0
+    with pytest.raises(RunFolderError, match="holds a run already"):
+        run_scenario(coarse_case_1, folder, make_simulation=flying_points)
+
+
+def test_commands_refuse_a_run_of_another_version(tmp_path, coarse_case_1, flying_points):
+    run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points)
+    record = tmp_path / "run" / run_folder.RECORD
+    record.write_text(record.read_text().replace('"format": 1', '"format": 7'))
+    for arguments in (["run", "--resume"], ["plot", "history"], ["report"]):
+        result = CliRunner().invoke(app, [*arguments, str(tmp_path / "run")])
+        assert result.exit_code == 2, arguments
+        assert result.stderr.strip() == f"{record} has format = 7, which another version wrote; this one reads 1."
 
 
 def test_no_run_folder(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warp_mpm.scenario import Fixed, Scenario, json_schema
+from warp_mpm.scenario import Fixed, Scenario, Trapezoid, json_schema
 from warp_mpm.scenario_errors import ScenarioError
 
 SCENES = Path(__file__).parents[2] / "scenarios"
@@ -23,6 +23,34 @@ def scene(name):
 @pytest.fixture
 def case_1():
     return scene("case_1")
+
+
+def test_a_scenario_is_refused_in_one_way_however_it_is_made(tmp_path, case_1):
+    content = case_1.resolved()
+    content["gravity"]["tilt_degg"] = 5.0
+    content["flow"]["material"]["porosity"] = 1.4
+    (tmp_path / "scene.json").write_text(json.dumps(content))
+    makers = {
+        "": [
+            lambda: Scenario(**content),
+            lambda: Scenario.model_validate(content),
+            lambda: Scenario.model_validate_json(json.dumps(content)),
+        ],
+        f"{tmp_path / 'scene.json'}: ": [lambda: Scenario.load(tmp_path / "scene.json")],
+    }
+    for prefix, ways in makers.items():
+        for make in ways:
+            with pytest.raises(ScenarioError) as refusal:
+                make()
+            assert str(refusal.value).splitlines() == [
+                f"{prefix}gravity.tilt_degg is not a field of a scenario; did you mean tilt_deg?",
+                f"{prefix}flow.material.porosity = 1.4 is not allowed; it must be a finite number greater than 0 and "
+                "less than 1.",
+            ]
+    with pytest.raises(ScenarioError, match="at least three of base_width_m"):
+        Trapezoid(kind="trapezoid", height_m=3.0)
+    assert Scenario(**case_1.resolved()) == case_1
+    assert Scenario(**{name: getattr(case_1, name) for name in Scenario.model_fields}) == case_1
 
 
 def test_all_scenes_of_the_paper_are_there():

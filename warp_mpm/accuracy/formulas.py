@@ -37,7 +37,7 @@ def formulas(scenario: Scenario) -> list[Formula]:
     made for does not give way. Empty where the closed form cannot see the scene.
     """
     try:
-        scene = scene_of(scenario.resolved())
+        scene = scene_of(scenario)
     except SceneError:
         return []
     makers: dict[str, Callable[[], Impact]] = {

@@ -35,13 +35,14 @@ def check_path(path: Path, formats: tuple[str, ...] = FORMATS) -> None:
         raise PlotError(f"{path} cannot be written: the folder {path.parent} does not exist.")
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: str | Path) -> None:
     """Write a figure in the format of its suffix, whole or not at all.
 
     Raises:
         UnwrittenError: the file cannot be written.
     """
     FigureCanvasAgg(figure)
+    path = Path(path)
     with whole_file(path) as aside:
         figure.savefig(aside, dpi=150, format=path.suffix.lstrip(".").lower())
 

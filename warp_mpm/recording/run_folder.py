@@ -15,6 +15,9 @@ try:
 except ImportError:  # no such lock on Windows
     fcntl = None  # type: ignore[assignment]
 
+FORMAT = 1
+"""Version of the layout, which a run's record states."""
+
 SCENARIO = "scenario.json"
 RECORD = "run.json"
 TIME_SERIES = "timeseries.csv"
@@ -43,8 +46,8 @@ class RunFolderError(OSError):
 class RunFolder:
     """A folder that a run may write to. A context manager, which sets the folder free for other runs at its end."""
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
         self._lock: int | None = None
 
     def __enter__(self) -> Self:
@@ -81,12 +84,13 @@ class RunFolder:
             self._lock = None
 
     @staticmethod
-    def check(path: Path, *, force: bool = False) -> None:
+    def check(path: str | Path, *, force: bool = False) -> None:
         """Refuse a folder that a run must not write to, without touching it.
 
         Raises:
             RunFolderError: it holds a run and `force` is not set, it holds something else, or it is a file.
         """
+        path = Path(path)
         if not path.exists():
             return
         if not path.is_dir():
@@ -105,7 +109,9 @@ class RunFolder:
             folder.lock()
 
     @classmethod
-    def create(cls, path: Path, scenario: dict[str, Any], record: dict[str, Any], *, force: bool = False) -> RunFolder:
+    def create(
+        cls, path: str | Path, scenario: dict[str, Any], record: dict[str, Any], *, force: bool = False
+    ) -> RunFolder:
         """Make the folder, locked, with the resolved scenario and the run's record; remove an older run's own files on
         `force`.
 
@@ -114,6 +120,7 @@ class RunFolder:
         """
         cls.check(path, force=force)
         folder = cls(path)
+        path = folder.path
         try:
             path.mkdir(parents=True, exist_ok=True)
             folder.lock()

@@ -161,7 +161,7 @@ def _closed_forms(results: Results) -> tuple[list[Calibration], list[str]]:
     if "impact_force_x" not in series:
         return [], []
     try:
-        scene = scene_of(results.scenario.resolved(), str(results.path))
+        scene = scene_of(results.scenario, str(results.path))
         return [calibrate(series["time"], series["impact_force_x"], scene, rule=rule) for rule in RULES], []
     except (SceneError, CalibrationError, ValueError) as error:
         return [], [f"No closed form over the curves: {error}"]

@@ -30,7 +30,7 @@ ASSETS = Path(__file__).parent / "assets"
 COLOURS = {"sequential": "viridis", "signed": "RdBu_r"}
 
 
-def write_report(runs: Sequence[Results], target: Path, *, times: Sequence[float] | None = None) -> None:
+def write_report(runs: Sequence[Results], target: str | Path, *, times: Sequence[float] | None = None) -> None:
     """Write the page of one run, or of several side by side, whole or not at all.
 
     Args:
@@ -69,7 +69,7 @@ def write_report(runs: Sequence[Results], target: Path, *, times: Sequence[float
         script="\n".join((ASSETS / name).read_text(encoding="utf-8") for name in ("points.js", "charts.js", "page.js")),
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
-    with whole_file(target) as aside:
+    with whole_file(Path(target)) as aside:
         aside.write_text(page, encoding="utf-8")
 
 

@@ -197,3 +197,13 @@ class Barrier(Model):
         assert isinstance(self.shape, Trapezoid)
         assert self.motion.density_kg_per_m3 is not None
         return self.motion.density_kg_per_m3 * geometry.area(self.shape.polygon)
+
+    @property
+    def density(self) -> float | None:
+        """Density [kg/m³] of a sliding barrier; None where the motion does not depend on it, or it has no end."""
+        if not isinstance(self.motion, Sliding) or isinstance(self.shape, Wall):
+            return None
+        if self.motion.density_kg_per_m3 is not None:
+            return self.motion.density_kg_per_m3
+        assert self.motion.mass_kg_per_m is not None
+        return self.motion.mass_kg_per_m / geometry.area(self.shape.polygon)

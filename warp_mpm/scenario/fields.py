@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
+
+from warp_mpm.scenario_errors import ScenarioError, sentences
 
 # The outer bounds are far beyond any flow; they keep the arithmetic of a typing error finite.
 Positive = Annotated[float, Field(gt=0.0, le=1e15)]
@@ -22,11 +25,49 @@ Series = Annotated[tuple[float, ...], Field(strict=False, min_length=1, max_leng
 
 
 class Model(BaseModel):
-    """Part of a scenario: frozen, strict, and no field that it does not know."""
+    """Part of a scenario: frozen, strict, and no field that it does not know.
+
+    Whichever way it is made, a value that is not allowed raises ScenarioError, with one sentence per problem.
+    """
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    def __init__(self, /, **fields: Any) -> None:
+        with _refusals(type(self)):
+            super().__init__(**fields)
+
+    # Tells pydantic not to call the constructor for what lies inside a model that it checks as a whole.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def model_validate(cls, obj: Any, *, source_name: str | None = None, **options: Any) -> Self:
+        """Check `obj`, a dict of the file's layout, and make a model of it; `source_name` is for the sentences.
+
+        Raises:
+            ScenarioError: with one sentence per problem, each naming field, value and what is allowed.
+        """
+        with _refusals(cls, source_name):
+            return super().model_validate(obj, **options)
+
+    @classmethod
+    def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
+        """As `model_validate`, of JSON text.
+
+        Raises:
+            ScenarioError: as `model_validate`.
+        """
+        with _refusals(cls):
+            return super().model_validate_json(json_data, **options)
+
+
+@contextmanager
+def _refusals(model: type[BaseModel], source_name: str | None = None) -> Iterator[None]:
+    try:
+        yield
+    except ValidationError as error:
+        raise ScenarioError(sentences(error, model), source_name) from None
 
 
 def set_fields(model: type[Model], fields: Mapping[str, tuple[Any, Any]]) -> None:

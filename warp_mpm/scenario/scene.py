@@ -7,18 +7,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
 from warp_mpm.scenario.fields import Model, set_fields
 from warp_mpm.scenario.flow import Flow, offer_laws
 from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
-from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
+from warp_mpm.scenario_errors import ScenarioError, read_json
 
 
 class Scenario(Model):
-    """A whole scene. `Scenario.load(path)` reads one; `Scenario.model_validate(dict)` makes one from Python."""
+    """A whole scene. `Scenario.load(path)` reads one; `Scenario.model_validate(dict)` makes one from Python.
+
+    They and the constructor raise one error, ScenarioError.
+    """
 
     title: Annotated[str, Field(min_length=1, max_length=200)]
     """One line that names the scene."""
@@ -44,18 +47,6 @@ class Scenario(Model):
             ScenarioError: the file cannot be read, is no JSON, or says something impossible; one sentence per problem.
         """
         return cls.model_validate(read_json(Path(path)), source_name=str(path))
-
-    @classmethod
-    def model_validate(cls, obj: Any, *, source_name: str | None = None, **kwargs: Any) -> Scenario:
-        """Check `obj`, a dict of the file's layout, and make a Scenario of it.
-
-        Raises:
-            ScenarioError: with one sentence per problem, each naming field, value and what is allowed.
-        """
-        try:
-            return super().model_validate(obj, **kwargs)
-        except ValidationError as error:
-            raise ScenarioError(sentences(error, cls), source_name) from None
 
     @model_validator(mode="before")
     @classmethod

@@ -140,14 +140,14 @@ class Sweep(_Model):
     """Start of the random numbers: the same seed, the same cases."""
 
     @classmethod
-    def load(cls, path: Path) -> Sweep:
+    def load(cls, path: str | Path) -> Sweep:
         """Read and check a sweep file.
 
         Raises:
             SweepError: it cannot be read, or asks for something impossible.
         """
         try:
-            return cls.model_validate(read_json(path))
+            return cls.model_validate(read_json(Path(path)))
         except ScenarioError as error:
             raise SweepError(str(error)) from None
         except ValidationError as error:

@@ -30,7 +30,7 @@ Row = dict[str, Any]
 def run_sweep(
     sweep: Sweep,
     base: Scenario,
-    out: Path,
+    out: str | Path,
     *,
     workers: int = 2,
     scheduler: str | None = None,
@@ -64,6 +64,7 @@ def run_sweep(
         SweepError: Dask is not installed, a case is impossible, or the folder holds another sweep; nothing was run.
     """
     _check_installed()
+    out = Path(out)
     cases = sweep.cases(base)
     _claim(out, {**sweep.model_dump(mode="json"), "scenario": base.resolved()})
     done = {case.number: row for case in cases if (row := _row_of(case, out, retry_failed)) is not None}

@@ -132,8 +132,8 @@ def force_history(quick: bool) -> Outcome:
             impulse = impact.impulse_until(float(until)) - impact.impulse_until(float(begin))
             simulation.set_external_force(impulse / (until - begin))
             simulation.advance(float(until))
-            speed.append(simulation.barrier_velocity)
-            moved.append(simulation.barrier_displacement)
+            speed.append(simulation.barrier_velocity or 0.0)
+            moved.append(simulation.barrier_displacement or 0.0)
         exact_speed = np.array([impact.barrier_velocity(float(t)) for t in times])
         exact_moved = np.array([impact.barrier_displacement(float(t)) for t in times])
         name = f"λ = {change:g}, τ = {ratio:g}"
