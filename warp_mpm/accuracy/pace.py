@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -70,7 +69,7 @@ class Machine:
 
     def __init__(self, device: str = "cpu"):
         self._device, self.clock = device, clock_of(device)
-        self.around = AROUND * statistics.median(_gauge() for _ in range(3))
+        self.around = AROUND * min(_gauge() for _ in range(5))
         self.least_cost = LEAST_COST if device == "cpu" else LEAST_COST_ELSEWHERE
 
     def prepare(self, scenario: Scenario) -> float:

@@ -307,6 +307,7 @@ class _Probes:
         self._scenario, self._asked, self._budget = scenario, asked, budget
         self._bench, self._kept, self._agree, self._say = bench, kept, agree, say
         self._begun, self._compiling, self._agreed, self._prepared = bench.clock(), 0.0, False, False
+        self._announced = "Timing this scene."
         if not _sound(kept.content()):
             kept.replace({})
 
@@ -356,7 +357,7 @@ class _Probes:
         if shipped is None or own != default:
             return None
         timed = max((rung.spacing for rung in shipped if rung.time > TIMED), default=shipped[-1].spacing)
-        self._say(f"This scene was measured before; a run at {timed:g} m tells how fast this machine is.")
+        self._announced = f"This scene was measured before; a run at {timed:g} m tells how fast this machine is."
         result = self._probe(timed)
         if result["status"] != "finished":
             raise PurchaseError(f"The probe at {timed:.4g} m failed: {result['problem']}")
@@ -389,7 +390,7 @@ class _Probes:
         first = self._spacings(PROBE_CELLS[:1])[0]
         if self._budget is None:
             every = self._spacings(PROBE_CELLS)
-            self._say(f"Probing this scene at spacings of {', '.join(f'{spacing:.4g}' for spacing in every)} m.")
+            self._announced = f"Probing this scene at spacings of {', '.join(f'{one:.4g}' for one in every)} m."
             least = self._expected(self._least(first), 0.0, [s for s in every if self._known(s) is None])
             if least > LONG:
                 self.ask(f"probes of {duration(least)} at least")
@@ -404,7 +405,7 @@ class _Probes:
             raise self._short(
                 f"a run at {first:.4g} m, the coarsest probe, takes {duration(self._least(first))} at least"
             )
-        self._say(f"Probing this scene, which counts as part of the budget, from a spacing of {first:.4g} m on.")
+        self._announced = f"Probing this scene, as part of the budget, from a spacing of {first:.4g} m on."
         result = self._probe(first)
         if result["status"] == "given up":
             whole = _stepping(result) * self._scenario.output.end_time_s / max(result["end_time"], 1e-12)
@@ -486,6 +487,7 @@ class _Probes:
     def _prepare(self, scene: Scenario) -> None:
         """Compile before the first probe, which then is as fast as the others."""
         if not self._prepared:
+            self._say(self._announced)
             self._begun, self._prepared = self._bench.clock(), True
             self._compiling = self._bench.prepare(scene)
 
