@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from types import CodeType, FunctionType
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
@@ -84,10 +84,11 @@ def content(idea: Any) -> str:
             value = value.fget
         elif isinstance(value, staticmethod | classmethod):
             value = value.__func__
-        if isinstance(value, FunctionType):
-            if value in seen:
+        if isinstance(value, FunctionType | type):
+            if value in seen or value.__module__.partition(".")[0] in _KNOWN:
                 return
             seen.add(value)
+        if isinstance(value, FunctionType):
             for name in sorted(take_code(value.__code__)):
                 if name in value.__globals__:
                     digest.update(name.encode())
@@ -95,15 +96,19 @@ def content(idea: Any) -> str:
             for cell in value.__closure__ or ():
                 take(cell.cell_contents)
         elif isinstance(value, type):
-            if value not in seen and value.__module__.partition(".")[0] not in _KNOWN:
-                seen.add(value)
-                for base in value.__bases__:
-                    take(base)
-                for name, member in sorted(vars(value).items()):
-                    if not name.startswith("__"):
-                        digest.update(name.encode())
-                        take(member)
-        elif isinstance(value, bool | int | float | str | tuple | frozenset | None | list | dict):
+            for base in value.__bases__:
+                take(base)
+            for name, member in sorted(vars(value).items()):
+                if not name.startswith("__"):
+                    digest.update(name.encode())
+                    take(member)
+        elif isinstance(value, Mapping):
+            take(list(value.items()))
+        elif isinstance(value, list | tuple):
+            digest.update(b"[")
+            for item in value:
+                take(item)
+        elif isinstance(value, bool | int | float | str | bytes | None):
             digest.update(repr(value).encode())
 
     def take_code(code: CodeType) -> set[str]:
@@ -118,9 +123,9 @@ def content(idea: Any) -> str:
         return names
 
     take(type(idea))
-    take(dict(sorted(getattr(idea, "__dict__", {}).items())))
+    take(getattr(idea, "__dict__", {}))
     return digest.hexdigest()[:12]
 
 
 _KNOWN = {"builtins", "warp_mpm", "warp", "pydantic", "typing", "abc", "numpy"}
-"""Packages whose classes are not part of a script."""
+"""Packages whose classes and functions are not part of a script."""
