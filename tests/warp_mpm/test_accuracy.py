@@ -404,6 +404,13 @@ class TestPurchase:
         lucky = Rung(0.6, 0.1, {"peak_force": 4e5, "impulse": 1e6})
         assert choose([lucky, *self.WOBBLE], (*self.SOLD, 0.6), taken, accuracy=0.04).spacing == 3.0 / 8
 
+    def test_three_runs_are_no_law(self) -> None:
+        """Three points lie on a line by accident: what was seen is promised, no less."""
+        offer = choose(self.LADDER[1:], self.SOLD, taken, budget=3600.0)
+        force = [rung.figures["peak_force"] for rung in self.LADDER[1:]]
+        assert offer.errors["peak_force"] == pytest.approx((max(force) - min(force)) / force[-1])
+        assert offer.values["peak_force"] == force[-1]
+
     def test_figure_that_is_nought_is_no_figure(self) -> None:
         """A barrier that could slide and does not."""
         rungs = [replace(r, figures=r.figures | {"barrier_displacement_final": 0.0}) for r in self.LADDER]
