@@ -173,7 +173,8 @@ def _compile(stage: Path, name: str, target: str) -> bytes:
     elif PLATFORMS[host_platform()][1][0] == target and (compiler := shutil.which("cc") or shutil.which("gcc")):
         command = [compiler, "-s"]
     else:
-        raise BuildError(needs_cross_compiler(f"Building for {target}"))
+        own = "" if PLATFORMS[host_platform()][1][0] != target else " without a C compiler (cc or gcc)"
+        raise BuildError(needs_cross_compiler(f"Building for {target}{own}"))
     if "windows" not in target:
         command += ["-fPIC", "-fvisibility=hidden"]
     libraries = [] if "windows" in target else ["-lm"]

@@ -71,6 +71,8 @@ def main() -> None:
         path = write_system(given.archives, given.out, spacing=given.spacing)
     except ValueError as error:
         parser.error(str(error))
+    except OSError as error:
+        parser.error(f"--out: {given.out} cannot be written: {error.strerror}")
     print(f"System: {path}")
     if given.run:
         end = scenario_in(given.archives).output.end_time_s if given.end is None else given.end
