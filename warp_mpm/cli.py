@@ -114,7 +114,8 @@ def run(
             _refuse("--resume DIR goes on with one run; it takes no scenario files.")
         from warp_mpm.commands.several import run_several
 
-        run_several(scenario_files, out, jobs, _options(device, spacing, until, report, force), quiet, as_json)
+        options = _options(device, spacing, until, report, force)
+        run_several(scenario_files, out, jobs, options, quiet, as_json, until=until, force=force)
         return
     scenario_file, ended_before = scenario_files[0] if scenario_files else None, False
     if resume is not None:

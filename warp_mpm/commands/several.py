@@ -17,7 +17,15 @@ DIVERGED, INTERRUPTED = 3, 130
 
 
 def run_several(
-    files: list[Path], out: Path | None, jobs: int | None, options: list[str], quiet: bool, as_json: bool
+    files: list[Path],
+    out: Path | None,
+    jobs: int | None,
+    options: list[str],
+    quiet: bool,
+    as_json: bool,
+    *,
+    until: float | None,
+    force: bool,
 ) -> None:
     """Run each scene in a process of its own and tell how each went.
 
@@ -28,6 +36,8 @@ def run_several(
         options: of `run`, handed on to each.
         quiet: print errors only.
         as_json: print the summaries as JSON, by folder, in place of the table.
+        until: end of all runs [s], as among the `options`; None: each scenario's own.
+        force: older runs are replaced, as among the `options`.
 
     Raises:
         typer.Exit: 2 when a file cannot be used and nothing was begun; otherwise the greatest exit code of the runs.
@@ -43,12 +53,11 @@ def run_several(
     with refusals():
         if len({file.stem for file in files}) < len(files):
             raise ValueError("Two of the scenarios have the same file name, so they would share a folder.")
-        until = options[options.index("--until") + 1] if "--until" in options else None
         planned = []
         for file in files:
             scenario, folder = Scenario.load(file), (out or Path("runs")) / file.stem
-            RunFolder.check(folder, force="--force" in options)
-            end_time = float(until) if until is not None else scenario.output.end_time_s
+            RunFolder.check(folder, force=force)
+            end_time = until if until is not None else scenario.output.end_time_s
             planned.append(Job(file.stem, folder, (str(file), "--out", str(folder), *options), end_time))
 
     console = Console(quiet=quiet, stderr=True, highlight=False, markup=False)
