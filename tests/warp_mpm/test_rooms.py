@@ -285,6 +285,20 @@ def test_content_follows_what_a_law_calls_and_not_its_comments():
     assert built("1.0") != built("2.0")
 
 
+def test_a_modules_name_fits_into_a_file_name():
+    everything = dict.fromkeys(
+        ("density_correction", "bulk_viscosity", "porosity_update", "barrier_friction", "side_walls", "ceiling"), True
+    )
+    names = {
+        Effects(
+            "two_phase", law=f"a_law_with_quite_a_long_name-{number}", drag="semi_implicit", **everything
+        ).module_name
+        for number in range(3)
+    }
+    assert len(names) == 3
+    assert max(map(len, names)) <= 220
+
+
 def test_what_cannot_be_registered():
     class Own(Law):
         name = "elastic"
