@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from .simulator.laws import DEFAULT, LAWS, Law
 from .simulator.schemes import SCHEMES, Scheme
+
+LONGEST_NAME = 220
+"""Characters of a module's name: file systems take 255, and Warp adds a hash and an ending."""
 
 
 @dataclass(frozen=True)
@@ -107,4 +111,7 @@ class Effects:
             )
             if getattr(self, name)
         ]
-        return "warp_mpm." + "-".join(flags)
+        name = "warp_mpm." + "-".join(flags)
+        if len(name) > LONGEST_NAME:  # of a file, with what Warp adds to it
+            name = name[: LONGEST_NAME - 17] + "-" + hashlib.sha256(name.encode()).hexdigest()[:16]
+        return name
