@@ -9,7 +9,6 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 from functools import cache, wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -32,7 +31,7 @@ from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
-from .state.samples import OF_THE_LEDGER, BarrierNow, Constants, Totals, sample
+from .state.samples import OF_THE_LEDGER, BarrierNow, Constants, Window, sample
 from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
@@ -67,11 +66,6 @@ LARGEST_FORCE = 1e15
 
 LARGEST_VELOCITY = 1e4
 """Greatest velocity [m/s] at which a caller may drive the barrier, as in a scenario."""
-
-
-def _totals_of(numbers: NDArray[np.float64], reactions: NDArray[np.float64]) -> Totals:
-    time, base_impulse, power, work = numbers.tolist()
-    return Totals(time, reactions.tolist(), base_impulse, power, work)
 
 
 def _out_of_range(name: str, value: float, largest: float, unit: str) -> str:
@@ -204,8 +198,8 @@ class Simulation:
         self._ledger_graph: Any = None
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
         self._constants = Constants(self.effects, self.bodies, self._barrier, scenario.gravity.vector)
-        self._last = self._before_last = self._totals()
-        """Totals at the last two samples between which a step was made."""
+        self._since = self.window()
+        """When the last call of `advance` that made a step began."""
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
         self._scene_mark = saved.scene_mark(scenario.resolved())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
@@ -321,7 +315,9 @@ class Simulation:
         self._fill(self._target, until)
         if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
             return
+        begin = self.window()
         wp.capture_launch(self._graph)
+        self._since = begin
         if int(self._read("counters")[at.DIVERGED]):
             raise SimulationDiverged(self._what_diverged())
 
@@ -394,6 +390,11 @@ class Simulation:
         clock = self._clock.numpy()
         clock[at.SPEED_MAX] = (velocity.reshape(-1, 2) ** 2).sum(axis=1).max()
         self._clock.assign(clock)
+        if self.effects.two_phase:
+            balance = self._balance.numpy()
+            slip = liquid @ (now["liquid_velocity"] - now["solid_velocity"])
+            balance[at.SEEPAGE_POWER_BEFORE] = slip @ np.array(self.scenario.gravity.vector)
+            self._balance.assign(balance)
 
     # -- state -------------------------------------------------------------------------------------------------
 
@@ -534,17 +535,21 @@ class Simulation:
         own = {**self.effects.skeleton.point_fields, **self.effects.scheme.point_fields}
         return {name: stored(name) if name in own else quantities[name]() for name in shown}
 
-    def _totals(self) -> Totals:
+    def window(self) -> Window:
+        """A mark of the present time, since which `sample` can tell mean forces. It belongs to the caller."""
         base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
-        return Totals(self.time, self._read("reactions").tolist(), base_impulse)
+        return Window(self.time, self._read("reactions").tolist(), base_impulse)
 
     @_one_thread_at_a_time_on_a_gpu
-    def sample(self, names: Collection[str] | None = None) -> dict[str, float]:
-        """Quantities now, and forces as means over the time since the last sample (impulse over interval); where no
-        step has been made since, the forces of that sample. All, or the time and what is named.
+    def sample(self, names: Collection[str] | None = None, *, since: Window | None = None) -> dict[str, float]:
+        """Quantities now, and forces as means since a time: impulse over interval. Looking changes nothing.
 
         Keys without the effect they belong to are absent. Sums over the material points are formed only if one of them
-        is named; `seepage_work` goes from one such sample to the next.
+        is named.
+
+        Args:
+            names: what is wanted beside the time; None: all.
+            since: a mark from `window`; None: when the last call of `advance` that made a step began.
 
         Raises:
             SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number; not every
@@ -559,8 +564,6 @@ class Simulation:
                 raise SimulationDiverged(self._what_diverged())
         else:
             sums = [0.0] * at.LEDGER_SIZE
-            sums[at.LEDGER_SEEPAGE] = self._last.seepage_power
-        totals = self._totals()
         barrier = BarrierNow()
         if self._barrier is not None:
             barrier = BarrierNow(
@@ -569,11 +572,10 @@ class Simulation:
                 self._barrier_number("work"),
                 self._barrier_number("base_work"),
             )
-        stepped = totals.time > self._last.time
         values = sample(
             self._constants,
-            totals,
-            self._last if stepped else self._before_last,
+            self.window(),
+            self._since if since is None else since,
             barrier=barrier,
             balance=self._read("balance").tolist(),
             clock=self._read("clock").tolist(),
@@ -581,17 +583,11 @@ class Simulation:
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
-        values["time"] = self.time
         for name, value in values.items():
             if not math.isfinite(value):
                 raise SimulationDiverged(
                     what_is_no_number(name, value, time=self.time, steps=self.steps, scenario=self.scenario)
                 )
-        if stepped:
-            self._before_last = self._last
-        self._last = replace(
-            totals, seepage_power=sums[at.LEDGER_SEEPAGE], seepage_work=values.get("seepage_work", 0.0)
-        )
         return values if names is None else {name: values[name] for name in values if name == "time" or name in names}
 
     @property
@@ -646,14 +642,11 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        self._last, self._before_last = (
-            _totals_of(state[f"{name}.numbers"], state[f"{name}.reactions"]) for name in ("last", "before_last")
-        )
+        time, base_impulse, *reactions = state["interval"].tolist()
+        self._since = Window(time, reactions, base_impulse)
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
         kept: dict[str, Any] = {"initial_momentum": self._initial_momentum, "scene": self._scene_mark}
-        for name, totals in (("last", self._last), ("before_last", self._before_last)):
-            kept[f"{name}.numbers"] = [totals.time, totals.base_impulse, totals.seepage_power, totals.seepage_work]
-            kept[f"{name}.reactions"] = totals.reactions
+        kept["interval"] = [self._since.time, self._since.base_impulse, *self._since.reactions]
         return state | {name: np.array(values) for name, values in kept.items()}

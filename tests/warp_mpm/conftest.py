@@ -9,6 +9,7 @@ import pytest
 
 from warp_mpm.discretization import material_points
 from warp_mpm.scenario import Scenario
+from warp_mpm.state.samples import Window
 
 SCENES = Path(__file__).parents[2] / "scenarios"
 
@@ -28,7 +29,7 @@ class FlyingPoints:
         self._velocity = np.array(scenario.flow.velocity_m_per_s, dtype=float)
         self._gravity = np.array(scenario.gravity.vector)
         self._fixed = scenario.barrier is None or scenario.barrier.mass is None
-        self._sampled, self._fail_at = 0.0, fail_at
+        self._fail_at = fail_at
         self.material_points = len(self._start.volume)
 
     def prepare(self):
@@ -41,10 +42,10 @@ class FlyingPoints:
         self.time = until
 
     def save_state(self):
-        return json.dumps([self.time, self.steps, self._sampled]).encode()
+        return json.dumps([self.time, self.steps]).encode()
 
     def restore_state(self, data):
-        self.time, self.steps, self._sampled = json.loads(data)
+        self.time, self.steps = json.loads(data)
 
     @property
     def record(self):
@@ -62,10 +63,13 @@ class FlyingPoints:
         whole = 0.5 * self.PEAK * (self.END - self.START)
         return whole - 0.5 * self.PEAK * max(self.END - time, 0.0) ** 2 / (self.END - self.PEAK_TIME)
 
-    def sample(self):
-        span = self.time - self._sampled
-        force = (self.impulse(self.time) - self.impulse(self._sampled)) / span if span > 0 else 0.0
-        self._sampled = self.time
+    def window(self):
+        return Window(self.time, [self.impulse(self.time)])
+
+    def sample(self, names=None, *, since=None):
+        begin = since or Window(0.0, [0.0])
+        span = self.time - begin.time
+        force = (self.impulse(self.time) - begin.reactions[0]) / span if span > 0 else 0.0
         mass = float(self._start.solid_mass.sum() + self._start.liquid_mass.sum())
         velocity = self._velocity + self._gravity * self.time
         points = self.points()

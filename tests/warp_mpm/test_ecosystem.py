@@ -62,8 +62,8 @@ def test_scene_with_nothing_solid_has_no_surfaces(tmp_path, load_scene, flying_p
     assert list(vtk_to_numpy(grid.GetCellData().GetArray("part"))) == [GROUND, BARRIER]  # the wall without end
 
     class Unobstructed(flying_points):
-        def sample(self):
-            series = super().sample().items()
+        def sample(self, names=None, *, since=None):
+            series = super().sample(since=since).items()
             return {name: value for name, value in series if not name.startswith(("impact", "barrier"))}
 
     bare = {**scene.resolved(), "barrier": None, "ground": None}

@@ -15,6 +15,7 @@ from warp_mpm.recording import RunFolder, Schedule, SnapshotRecorder, TimeSeries
 from warp_mpm.recording.quantities import TIME_SERIES
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.results import ResultsError, Snapshots, read_time_series
+from warp_mpm.state.samples import Window
 
 
 class Clock:
@@ -31,7 +32,10 @@ class Clock:
         self.barrier_displacement = 0.25 * until
         self.visited.append(until)
 
-    def sample(self):
+    def window(self):
+        return Window(self.time, [])
+
+    def sample(self, names=None, *, since=None):
         return {"time": self.time, "impact_force_x": 1.0 / 3.0}
 
     def points(self):

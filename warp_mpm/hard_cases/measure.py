@@ -102,8 +102,14 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
                 measured.peak = snapshot
         measured.last = snapshot
 
+    windows: list[Any] = [None]
+
+    def sample(simulation: Any) -> None:
+        samples.append(simulation.sample(since=windows[-1]))
+        windows[-1] = simulation.window()
+
     recorders = [
-        _Looker(Schedule(output.time_series_interval_s), lambda simulation: samples.append(simulation.sample())),
+        _Looker(Schedule(output.time_series_interval_s), sample),
         _Looker(Schedule(output.snapshot_interval_s), look),
     ]
     try:

@@ -20,6 +20,7 @@ from .layout import layout
 from .ledger import make_ledger
 from .pore_pressure import make_pore_pressure
 from .rigid_barrier import make_rigid_barrier
+from .seepage import make_seepage
 from .shape_functions import make_shape_functions
 from .transfer import make_transfer
 
@@ -55,6 +56,8 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         ledger=make_ledger(types, pore, module).ledger,
         **effects.scheme.kernels(types, tools, module),
     )
+    if effects.two_phase:
+        kernels.seep = make_seepage(types, module).seep
     if effects.bodies:
         contact = make_contact(types, bodies, module)
         kernels.__dict__.update(contact.kernels)

@@ -18,6 +18,9 @@ from .layout import (
     LEFT_SOLID_MASS,
     LIMIT_OUTPUT,
     LIMIT_WAVE,
+    SEEPAGE_POWER,
+    SEEPAGE_POWER_BEFORE,
+    SEEPAGE_WORK,
     SMALLEST_TIME_STEP,
     SPEED_MAX,
     STEPS,
@@ -35,6 +38,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Grid = types.Grid
     MOVING = effects.moving
     DRIVEN = effects.driven
+    TWO_PHASE = effects.two_phase
 
     @wp.func
     def choose_step(parameters: Parameters, clock: wp.array(dtype=wp.float64), counters: wp.array(dtype=wp.int32)):
@@ -130,6 +134,12 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         gy = wp.float64(parameters.gravity[1])
         balance[wp.static(GRAVITY_IMPULSE_X)] = balance[wp.static(GRAVITY_IMPULSE_X)] + gx * weight
         balance[wp.static(GRAVITY_IMPULSE_Y)] = balance[wp.static(GRAVITY_IMPULSE_Y)] + gy * weight
+        if TWO_PHASE:
+            power = balance[wp.static(SEEPAGE_POWER)]
+            mean = wp.float64(0.5) * (balance[wp.static(SEEPAGE_POWER_BEFORE)] + power)
+            balance[wp.static(SEEPAGE_WORK)] = balance[wp.static(SEEPAGE_WORK)] + dt * mean
+            balance[wp.static(SEEPAGE_POWER_BEFORE)] = power
+            balance[wp.static(SEEPAGE_POWER)] = wp.float64(0.0)
         sound = wp.bool(True)
         if MOVING:
             sound = carry(bodies, grid, reactions, dt)

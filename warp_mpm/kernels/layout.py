@@ -38,7 +38,12 @@ ACTIVE_MASS_SOLID = 2
 ACTIVE_MASS_LIQUID = 3
 INITIAL_MASS_SOLID = 4
 INITIAL_MASS_LIQUID = 5
-BALANCE_SIZE = 6
+SEEPAGE_POWER = 6
+"""Rate at which gravity works on liquid that moves relative to the skeleton, as it is summed up in a step [W/m]."""
+SEEPAGE_POWER_BEFORE = 7
+SEEPAGE_WORK = 8
+"""Its integral over time, by the trapezoidal rule over the steps [J/m]."""
+BALANCE_SIZE = 9
 
 # Entries of the limiters, a float64 array: how often each acted, once per step and point.
 GAPS_BOUNDED = 0
@@ -78,9 +83,7 @@ LEDGER_PRESSURE_MEAN = 9
 """Greatest pressure upstream of the crest's end, less its noise about the mean over a cell."""
 LEDGER_NOT_FINITE = 10
 """Material points of which some quantity is not a finite number."""
-# Rate at which gravity works on liquid that moves relative to the skeleton.
-LEDGER_SEEPAGE = 11
-LEDGER_SIZE = 12
+LEDGER_SIZE = 11
 
 # What left the domain, a float64 array.
 LEFT_SOLID_MASS = 0

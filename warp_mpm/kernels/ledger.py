@@ -15,7 +15,6 @@ from .layout import (
     LEDGER_NOT_FINITE,
     LEDGER_PRESSURE_MAX,
     LEDGER_PRESSURE_MEAN,
-    LEDGER_SEEPAGE,
     LEDGER_SOLID_MASS,
     LEDGER_SPEED_MAX,
 )
@@ -25,7 +24,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     """Build the kernel `ledger` (over workers that share the points), which adds to an array emptied before."""
     effects = types.effects
     F = types.scalar
-    V2 = types.V2
     Points = types.Points
     pressure_at = pore.pressure
     porosity = pore.porosity
@@ -74,7 +72,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         kinetic_energy = wp.float64(0.0)
         gravitational_energy = wp.float64(0.0)
         elastic_energy = wp.float64(0.0)
-        seepage = wp.float64(0.0)
         momentum_x = wp.float64(0.0)
         momentum_y = wp.float64(0.0)
         speed_max = wp.float64(0.0)
@@ -109,7 +106,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     along_x += liquid * v[2]
                     along_y += liquid * v[3]
                     liquid_mass += wp.float64(liquid)
-                    seepage += wp.float64(liquid * wp.dot(parameters.gravity, V2(v[2] - v[0], v[3] - v[1])))
                 s = read(points.stress, p)
                 squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
                 grains = parameters.grain_share * reference
@@ -155,7 +151,6 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         wp.atomic_add(sums, wp.static(LEDGER_NOT_FINITE), not_finite)
         if TWO_PHASE:
             wp.atomic_add(sums, wp.static(LEDGER_LIQUID_MASS), liquid_mass)
-            wp.atomic_add(sums, wp.static(LEDGER_SEEPAGE), seepage)
         if LIQUID:
             wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), pressure_max)
             wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MEAN), pressure_mean)

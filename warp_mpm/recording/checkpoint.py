@@ -32,7 +32,7 @@ LONGEST_HEADER = 100_000
 class Marked(Protocol):
     """A recorder that can tell where it stands."""
 
-    def mark(self) -> dict[str, int]:
+    def mark(self) -> dict[str, Any]:
         """Bring everything to the disk and tell where the records stand."""
 
 
@@ -44,7 +44,7 @@ class Checkpoint:
     """Simulated time [s]."""
     wall_time: float
     """Wall time of the run up to there [s]."""
-    marks: dict[str, dict[str, int]]
+    marks: dict[str, dict[str, Any]]
     """Where each recorder stood."""
     state: bytes
     """Of `Simulation.save_state`."""

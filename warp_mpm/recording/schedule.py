@@ -7,7 +7,7 @@ the end of the run where that is among them. No record therefore covers less.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Protocol
 
 from warp_mpm.time_step import SHORTEST_RECORD
@@ -27,8 +27,11 @@ class Simulated(Protocol):
     def advance(self, until: float) -> Any:
         """Step to exactly `until` [s]."""
 
-    def sample(self) -> dict[str, float]:
-        """Quantities of the whole scene; forces are means since the sample before."""
+    def window(self) -> Any:
+        """A mark of the present time."""
+
+    def sample(self, names: Collection[str] | None = None, *, since: Any = None) -> dict[str, float]:
+        """Quantities of the whole scene, all or what is named; forces are means since a mark from `window`."""
 
     def points(self) -> dict[str, Any]:
         """Arrays of the material points, one row each."""

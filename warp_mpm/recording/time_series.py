@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
 from warp_mpm.recording.quantities import TIME_SERIES, check_known
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
+from warp_mpm.state.samples import Window
 
 
 class TimeSeriesRecorder:
@@ -24,7 +26,7 @@ class TimeSeriesRecorder:
         interval: float,
         *,
         quantities: Collection[str] | None = None,
-        mark: Mapping[str, int] | None = None,
+        mark: Mapping[str, Any] | None = None,
     ):
         """Create the file, or go on at an earlier `mark` in it; what was written after that is dropped.
 
@@ -43,11 +45,14 @@ class TimeSeriesRecorder:
         """The last sample, for whoever shows progress."""
         self._quantities = quantities
         self._columns: list[str] = []
+        self._window: Any = None
+        """When the sample before was taken; the forces of the next one are means since then."""
         self._file: TextIO
         if mark is None:
             self._file = path.open("x", encoding="utf-8", newline="")
             return
         self.schedule.count = mark["records"]
+        self._window = Window(*mark["window"]) if mark["window"] is not None else None
         try:
             self._file = path.open("r+", encoding="utf-8", newline="")
             header = self._file.readline().rstrip("\n").split(",")
@@ -62,15 +67,17 @@ class TimeSeriesRecorder:
         self._file.truncate(mark["bytes"])
         self._file.seek(mark["bytes"])
 
-    def mark(self) -> dict[str, int]:
-        """Bring everything to the disk and tell where the file stands."""
+    def mark(self) -> dict[str, Any]:
+        """Bring everything to the disk and tell where the file stands, and when the last sample was taken."""
         self._file.flush()
         os.fsync(self._file.fileno())
-        return {"records": self.schedule.count, "bytes": os.fstat(self._file.fileno()).st_size}
+        window = list(astuple(self._window)) if self._window is not None else None
+        return {"records": self.schedule.count, "bytes": os.fstat(self._file.fileno()).st_size, "window": window}
 
     def record(self, simulation: Any) -> None:
         """Append one sample."""
-        sample = simulation.sample() if self._quantities is None else simulation.sample(self._quantities)
+        sample = simulation.sample(self._quantities, since=self._window)
+        self._window = simulation.window()
         if not self._columns:
             check_known(set(sample), TIME_SERIES)
             self._columns = [name for name in TIME_SERIES if name in sample]

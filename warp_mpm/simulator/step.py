@@ -42,6 +42,9 @@ def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
     ]
     for body in bodies:
         step += _contact(body, passes(body, bodies))
+    if effects.two_phase:
+        seen = ("grid", "parameters", "balance")
+        step.append(Launch("seep", "workers", seen, "rate at which gravity works on liquid that seeps"))
     step.append(Launch("gather", "points", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))

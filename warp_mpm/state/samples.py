@@ -11,7 +11,7 @@ from ..kernels import layout as at
 from ..simulator.bodies import Body, Sliding
 
 OF_THE_LEDGER = frozenset(
-    ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy", "seepage_work", "speed_max",
+    ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy", "speed_max",
      "solid_mass", "liquid_mass", "pore_pressure_max", "pore_pressure_max_anywhere", "momentum_x", "momentum_y",
      "momentum_residual_x", "momentum_residual_y")
 )  # fmt: skip
@@ -19,8 +19,8 @@ OF_THE_LEDGER = frozenset(
 
 
 @dataclass(frozen=True)
-class Totals:
-    """Sums since t = 0, of which forces are the differences."""
+class Window:
+    """Sums since t = 0 at some time: forces since then are differences to them."""
 
     time: float
     """[s]."""
@@ -28,10 +28,6 @@ class Totals:
     """Impulse of the flow on each surface along x and y, one after the other [N s/m]."""
     base_impulse: float = 0.0
     """Of friction at the barrier's base [N s/m]."""
-    seepage_power: float = 0.0
-    """Rate at which gravity works on liquid that moves relative to the skeleton, at this time [W/m]."""
-    seepage_work: float = 0.0
-    """That work since t = 0, by the trapezoidal rule over the samples [J/m]."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +58,8 @@ class BarrierNow:
 
 def sample(
     constants: Constants,
-    now: Totals,
-    last: Totals,
+    now: Window,
+    since: Window,
     *,
     barrier: BarrierNow,
     balance: Sequence[float],
@@ -72,11 +68,11 @@ def sample(
     left: Sequence[float],
     initial_momentum: Sequence[float],
 ) -> dict[str, float]:
-    """Quantities now, and forces as means over the time since the last sample (impulse over interval).
+    """Quantities now, and forces as means over a stretch of time (impulse over its length).
 
     Args:
         constants: of the scene.
-        now, last: totals now and at the last sample.
+        now, since: totals now and at the beginning of that stretch.
         barrier: its motion; of no matter where there is none.
         balance: what gravity gave to the flow.
         clock: for the time step.
@@ -85,9 +81,9 @@ def sample(
         initial_momentum: of the flow along x and y [N s/m].
     """
     effects, reactions = constants.effects, now.reactions
-    elapsed = now.time - last.time
+    elapsed = now.time - since.time
     rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
-    forces = [(after - before) * rate for after, before in zip(reactions, last.reactions, strict=True)]
+    forces = [(after - before) * rate for after, before in zip(reactions, since.reactions, strict=True)]
     values = {"time": now.time}
     momentum_x, momentum_y = sums[at.LEDGER_MOMENTUM_X], sums[at.LEDGER_MOMENTUM_Y]
     residual_x = momentum_x - initial_momentum[0] - balance[at.GRAVITY_IMPULSE_X] + left[at.LEFT_MOMENTUM_X]
@@ -112,7 +108,7 @@ def sample(
             vertical = sum(values[f"{surface.name}_force_y"] for surface in body.surfaces)
             weight = -body.motion.mass * constants.gravity[1]
             values |= {
-                "base_force": -(now.base_impulse - last.base_impulse) * rate,
+                "base_force": -(now.base_impulse - since.base_impulse) * rate,
                 "base_normal_force": max(weight - vertical, 0.0),
                 "base_friction_work": barrier.base_work,
                 "barrier_kinetic_energy": 0.5 * body.motion.mass * barrier.velocity**2,
@@ -131,7 +127,7 @@ def sample(
         values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MEAN]
     if effects.two_phase:
         # Liquid is carried at the skeleton's points, so that its own fall through the voids is in no potential energy.
-        values["seepage_work"] = last.seepage_work + 0.5 * elapsed * (last.seepage_power + sums[at.LEDGER_SEEPAGE])
+        values["seepage_work"] = balance[at.SEEPAGE_WORK]
         values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
     values |= {
         "momentum_x": momentum_x,

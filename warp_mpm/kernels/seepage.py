@@ -1,0 +1,36 @@
+"""Work of gravity on the liquid that moves through the skeleton, which is in no potential energy: see `theory.md`."""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+from .layout import BLOCK, SEEPAGE_POWER
+
+
+def make_seepage(types: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernel `seep` (workers on the blocks in use), for two phases."""
+    F = types.scalar
+    Grid = types.Grid
+    Parameters = types.Parameters
+
+    @wp.kernel(module=module)
+    def seep(grid: Grid, parameters: Parameters, balance: wp.array(dtype=wp.float64)):
+        """Its rate at the end of the step [W/m]: g . sum m_L (v_L - v_S), over the nodes, which have all momentum."""
+        worker = wp.tid()
+        slip = wp.vec2d()
+        for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+            block = grid.active[s / wp.static(BLOCK)]
+            bi = block / parameters.block_rows
+            bj = block - bi * parameters.block_rows
+            i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            for b in range(wp.static(BLOCK)):
+                j = bj * wp.static(BLOCK) + b
+                mass = grid.mass[i, j]
+                if mass > F(0.0):
+                    v = grid.velocity[i, j]
+                    liquid = mass * parameters.liquid_ratio
+                    slip += wp.vec2d(wp.float64(liquid * (v[2] - v[0])), wp.float64(liquid * (v[3] - v[1])))
+        g = wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
+        wp.atomic_add(balance, wp.static(SEEPAGE_POWER), wp.dot(g, slip))
+
+    return SimpleNamespace(seep=seep)
