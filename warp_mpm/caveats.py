@@ -115,7 +115,7 @@ def _impossible_start(scenario: Scenario) -> list[str]:
 
 def _can_arrive(scenario: Scenario) -> bool:
     """No front is faster than one that slides without friction and spreads as a dam break does, 2 √(g h) ahead. A
-    driven barrier comes to meet it, or flees."""
+    driven barrier comes to meet it, or flees, and one that slides by its own weight may come to meet it."""
     flow, end = scenario.flow, scenario.output.end_time_s
     acceleration, _ = scenario.gravity.vector
     x, y = flow.polygon.T
@@ -126,11 +126,18 @@ def _can_arrive(scenario: Scenario) -> bool:
     time = np.linspace(0.0, end, 401)
     going = np.minimum(time, farthest)
     front = float(x.max()) + speed * going + 0.5 * acceleration * going**2
+    # From there it goes back, unless the ground holds it.
+    held = scenario.ground.friction * -scenario.gravity.vector[1] if scenario.ground is not None else 0.0
+    front += 0.5 * min(acceleration + held, 0.0) * np.maximum(time - farthest, 0.0) ** 2
     face = np.zeros(len(time))  # where it starts
     motion = scenario.barrier.motion if scenario.barrier is not None else None
     if isinstance(motion, Prescribed):
         velocity = np.interp(time, motion.times_s, motion.velocities_m_per_s)
         face[1:] = np.cumsum(0.5 * (velocity[1:] + velocity[:-1])) * (end / (len(time) - 1))
+    elif isinstance(motion, Sliding):
+        # Where the ground falls upstream, its own weight may pull it to the flow.
+        held = motion.base_friction_coefficient * -scenario.gravity.vector[1]
+        face = 0.5 * min(acceleration + held, 0.0) * time**2
     return bool((front >= face - scenario.numerics.spacing_m).any())
 
 

@@ -381,6 +381,12 @@ class TestPurchase:
         slower = choose(self.LADDER, self.SOLD, lambda spacing: 2.0 * taken(spacing), budget=60.0)
         assert slower.spacing > offer.spacing
 
+    def test_a_flow_that_never_arrives_has_no_figures(self) -> None:
+        """As a scene without a barrier, of which alone the sentence spoke."""
+        silent = [Rung(rung.spacing, rung.time, dict.fromkeys(rung.figures, 0.0)) for rung in self.LADDER]
+        with pytest.raises(PurchaseError, match="In none of the probes did the flow reach a barrier"):
+            choose(silent, self.SOLD, budget=60.0)
+
     def test_says_what_can_be_had(self) -> None:
         # 1.25 times 0.2 times 3 m / 120.
         with pytest.raises(

@@ -65,6 +65,9 @@ def test_a_slip_is_told(load_scene, changes, words):
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [-20.0]},
          "flow.velocity_m_per_s": [-15.0, 0.0]},  # a barrier that runs after the flow
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0, 2.0], "velocities_m_per_s": [30.0, 0.0]}},
+        # The barrier slides down to a flow that stays where it is, held by the ground.
+        {"gravity.tilt_deg": -30.0, "flow.shape.distance_m": 20.0, "flow.velocity_m_per_s": [0.0, 0.0],
+         "ground.friction": 1.0},
         {"flow.lateral_stress_coefficient": 10, "flow.initial_stress": "zero"},
         {"flow.lateral_stress_coefficient": 3, "flow.material.cohesion_Pa": 1e5},
         {"flow.material.friction_angle_deg": 0.0, "flow.lateral_stress_coefficient": None},

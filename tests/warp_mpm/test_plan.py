@@ -109,3 +109,9 @@ def test_command(tmp_path, monkeypatch):
     nowhere = runner.invoke(app, ["plan", file, "--device", "cuda:7"])
     assert nowhere.exit_code == 2
     assert "cuda:7" in nowhere.output
+
+
+def test_a_run_of_few_snapshots_has_a_card(load_scene):
+    """More snapshots are timed than the run itself has."""
+    scenario = load_scene("case_1", **{"numerics.spacing_m": 1.0, "output.end_time_s": 0.1})
+    assert make_plan(scenario.replaced({"output.snapshot_interval_s": 0.1})).recording_time > 0.0
