@@ -194,6 +194,17 @@ def test_fields_of_a_law_are_checked_and_in_the_schema(load_scene):
     assert scene_caveats(scene(load_scene, "damped", viscosity_Pa_s=2e6))[-1] == "The mixture is stiff."
 
 
+@pytest.mark.parametrize(("old", "new"), [(False, '"law": "elastic"'), (True, '"law": "mohr_coulomb"')])
+def test_the_field_that_the_law_replaced_says_what_to_write(load_scene, old, new):
+    data = load_scene("case_1").resolved()
+    data["flow"]["material"]["plasticity"] = old
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.model_validate(data)
+    (sentence,) = refused.value.problems
+    assert sentence.startswith(f"flow.material: plasticity = {str(old).lower()} is no longer a field")
+    assert new in sentence
+
+
 def test_fields_of_a_scheme_are_checked_and_have_defaults(load_scene):
     blended = script("blended_transfer")
     schemes.register(blended.Blend())
