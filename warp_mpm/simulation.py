@@ -38,7 +38,7 @@ __all__ = ["Simulation", "SimulationDiverged"]
 
 STATE_OF_BODIES = (
     *("displacement", "velocity", "old_velocity", "impulse", "work"),
-    *("external_force", "base_impulse", "base_work", "times", "velocities"),
+    *("ahead", "next", "external_force", "base_impulse", "base_work", "times", "velocities"),
 )
 """Arrays of the bodies that change during a run."""
 
@@ -220,14 +220,14 @@ class Simulation:
             self._launch("place", places, structure, bodies, grid, parameters, of=body.name)
         if isinstance(body.motion, Sliding):
             self._launch("collect", places, structure, bodies, grid, parameters, of=body.name)
-            self._launch("slide", 1, structure, bodies, parameters, clock, self._counters, of=body.name)
+            self._launch("slide", 1, structure, bodies, grid, parameters, clock, self._counters, of=body.name)
             self._launch("push", places, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
         else:
             groups = len(contact.arrays["block"])
             self._launch("press", groups, structure, bodies, grid, parameters, clock, self._reactions, of=body.name)
 
     def _start(self) -> None:
-        self._launch("start", 1, self._parameters, self._clock, self._counters, self._running, self._bodies)
+        self._launch("start", 1, self._parameters, self._clock, self._counters, self._running, self._bodies, self._grid)
 
     def _interval(self) -> None:
         self._start()

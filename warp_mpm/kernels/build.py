@@ -12,6 +12,7 @@ from ..simulator.bodies.kernels import make_body_functions, make_place
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
+from .elementary import make_elementary
 from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
@@ -35,10 +36,10 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     types = layout(effects)
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
-    bodies = make_body_functions(types) if effects.bodies else None
+    bodies = make_body_functions(types, make_elementary(types)) if effects.bodies else None
     transfer = make_transfer(types, shapes, pore, bodies, module)
     constitutive = make_constitutive(types, shapes, pore, bodies, module)
-    clock = make_clock(types, module)
+    clock = make_clock(types, bodies, module)
     kernels = SimpleNamespace(
         types=types,
         move=make_grid_momentum(types, module).move,
@@ -49,10 +50,10 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
         ledger=make_ledger(types, pore, module).ledger,
     )
     if effects.bodies:
-        contact = make_contact(types, bodies, module)
+        contact = make_contact(types, module)
         kernels.__dict__.update(contact.kernels)
         if effects.passing:
             kernels.place = make_place(types, bodies, module)
         if effects.sliding:
-            kernels.slide = make_rigid_barrier(types, contact, module).slide
+            kernels.slide = make_rigid_barrier(types, contact, bodies, module).slide
     return kernels

@@ -15,7 +15,7 @@ from typing import Any
 import warp as wp
 
 from ..effects import Effects
-from ..simulator.bodies.kernels import body_fields, contact_fields
+from ..simulator.bodies.kernels import PIECE, body_fields, contact_fields
 
 BLOCK_SHIFT = 3
 BLOCK = 1 << BLOCK_SHIFT
@@ -108,6 +108,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     V = wp.types.vector(components, scalar)
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
+    P = wp.types.vector(PIECE, scalar)
     array = wp.array
 
     points: dict[str, Any] = {
@@ -144,7 +145,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
-        "shift": array(dtype=wp.float64),  # displacement of the grid along x since the start [m]
+        "shift": array(dtype=wp.float64),  # of the grid along x since the start: now, and at the end of the step [m]
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
@@ -160,6 +161,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["liquid_alone"] = array(dtype=V2, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
+    if effects.bodies and not effects.passing:
+        grid["solid"] = array(dtype=wp.int32, ndim=2)  # 1: a point in the cell may be too deep in a body
     if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
     if effects.density_correction:
@@ -224,8 +227,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
         parameters["drag_coefficient"] = scalar  # Q = n^2 rho_L g / k_sat
-    bodies = body_fields(effects, scalar, V2, V4)
-    contact = contact_fields(effects, scalar, V2, V) if effects.bodies else {}
+    bodies = body_fields(effects, scalar, V2, V4, P)
+    contact = contact_fields(effects, scalar, V2, V, P) if effects.bodies else {}
 
     return SimpleNamespace(
         effects=effects,
@@ -235,6 +238,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         V4=V4,
         V=V,
         S=S,
+        P=P,
         components=components,
         Points=_structure("Points", points),
         Grid=_structure("Grid", grid),

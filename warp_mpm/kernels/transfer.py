@@ -47,8 +47,8 @@ def make_transfer(
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
-    near = bodies_of.near if LIQUID_ALONE else None
-    displaced = bodies_of.displaced if LIQUID_ALONE else None
+    in_hull = bodies_of.in_hull if LIQUID_ALONE else None
+    MOVING = effects.moving
     Bodies = types.Bodies
     POROSITY = effects.porosity_update
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
@@ -202,8 +202,15 @@ def make_transfer(
             # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
             for body in range(bodies.count):
-                if bodies.rubs[body] == 1:
-                    if near(bodies, body, x - displaced(bodies, body), F(3.0) * parameters.spacing):
+                if read(bodies.rubs, body) == 1:
+                    seen = x
+                    if MOVING:
+                        moved = bodies.displacement[body]
+                        seen -= V2(F(moved[0]), F(moved[1]))
+                    reach = F(3.0) * parameters.spacing
+                    first_piece = read(bodies.first_piece, body)
+                    last_piece = read(bodies.first_piece, body + 1)
+                    if in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
                         rubbed = wp.bool(True)
             if rubbed:
                 alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.true_liquid_density
