@@ -39,7 +39,7 @@ __all__ = ["Simulation", "SimulationDiverged"]
 
 STATE_OF_BODIES = (
     *("displacement", "velocity", "old_velocity", "impulse", "work"),
-    *("external_force", "base_impulse", "base_work", "times", "velocities"),
+    *("ahead", "next", "external_force", "base_impulse", "base_work", "times", "velocities"),
 )
 """Arrays of the bodies that change during a run."""
 

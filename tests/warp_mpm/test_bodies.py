@@ -11,6 +11,7 @@ import warp as wp
 from warp_mpm import geometry
 from warp_mpm.effect_rules import derive_effects
 from warp_mpm.grid import fit_grid
+from warp_mpm.kernels.elementary import make_elementary
 from warp_mpm.kernels.layout import layout
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
@@ -76,14 +77,13 @@ def test_distance_and_normal_are_those_of_the_outline(outline):
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_the_kernels_see_the_same_distance(load_scene, precision):
     types = layout(derive_effects(load_scene("case_1", **{"numerics.precision": precision})))
-    F, V2, nearest = types.scalar, types.V2, make_body_functions(types).nearest
-    vectors, numbers = wp.array(dtype=V2), wp.array(dtype=F)
+    F, V2, P, nearest = types.scalar, types.V2, types.P, make_body_functions(types, make_elementary(types)).nearest
+    vectors, numbers, rows = wp.array(dtype=V2), wp.array(dtype=F), wp.array(dtype=P)
 
     @wp.kernel(module="unique")
-    def look(b: vectors, a: vectors, low: numbers, high: numbers, n: vectors, o: numbers, place: vectors, d: numbers,
-             normal: vectors, piece: wp.array(dtype=wp.int32)):  # fmt: skip
+    def look(pieces: rows, place: vectors, d: numbers, normal: vectors, piece: wp.array(dtype=wp.int32)):
         i = wp.tid()
-        distance, direction, k = nearest(b, a, low, high, n, o, 0, o.shape[0], place[i])
+        distance, direction, k = nearest(pieces, 0, pieces.shape[0], place[i])
         d[i] = distance
         normal[i] = direction
         piece[i] = k
@@ -91,9 +91,8 @@ def test_the_kernels_see_the_same_distance(load_scene, precision):
     place = places()
     for outline in OUTLINES.values():
         s = outline.segments
-        given = [(s.begin, V2), (s.along, V2), (s.low, F), (s.high, F), (s.normal, V2), (s.offset, F), (place, V2)]
         found = [wp.zeros(len(place), dtype=kind, device="cpu") for kind in (F, V2, wp.int32)]
-        arrays = [wp.array(values, dtype=kind, device="cpu") for values, kind in given]
+        arrays = [wp.array(values, dtype=kind, device="cpu") for values, kind in ((s.numbers, P), (place, V2))]
         wp.launch(look, dim=len(place), inputs=[*arrays, *found], device="cpu")
         distance, normal, piece = s.nearest(place)
         tolerance = 1e-12 if precision == "float64" else 2e-6

@@ -39,13 +39,14 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     types = layout(effects)
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
-    tools = SimpleNamespace(**make_elementary(types).__dict__, **shapes.__dict__)
+    elementary = make_elementary(types)
+    tools = SimpleNamespace(**elementary.__dict__, **shapes.__dict__)
     types.scheme = SimpleNamespace(**scheme_functions(effects.scheme, types, tools))
     types.law = SimpleNamespace(**law_functions(effects.skeleton, types, tools))
-    bodies = make_body_functions(types) if effects.bodies else None
+    bodies = make_body_functions(types, elementary) if effects.bodies else None
     transfer = make_transfer(types, shapes, pore, bodies, module)
     constitutive = make_constitutive(types, shapes, pore, bodies, module)
-    clock = make_clock(types, module)
+    clock = make_clock(types, bodies, module)
     kernels = SimpleNamespace(
         types=types,
         move=make_grid_momentum(types, module).move,
@@ -59,10 +60,10 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     if effects.two_phase:
         kernels.seep = make_seepage(types, module).seep
     if effects.bodies:
-        contact = make_contact(types, bodies, module)
+        contact = make_contact(types, module)
         kernels.__dict__.update(contact.kernels)
         if effects.passing:
             kernels.place = make_place(types, bodies, module)
         if effects.sliding:
-            kernels.slide = make_rigid_barrier(types, contact, module).slide
+            kernels.slide = make_rigid_barrier(types, contact, bodies, module).slide
     return kernels

@@ -1,6 +1,7 @@
 """Time on the device: the step is chosen there, so that a whole output interval needs no host."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -30,12 +31,14 @@ from .layout import (
 )
 
 
-def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_clock(types: SimpleNamespace, bodies_of: Any, module: str) -> SimpleNamespace:
     """Build the kernels `start` (before an interval's first step) and `tick` (after each step), one thread each."""
     effects = types.effects
     Parameters = types.Parameters
     Bodies = types.Bodies
     Grid = types.Grid
+    F = types.scalar
+    look_ahead = bodies_of.look_ahead if effects.driven else None
     MOVING = effects.moving
     DRIVEN = effects.driven
     TWO_PHASE = effects.two_phase
@@ -58,7 +61,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         clock[wp.static(TIME_STEP)] = remaining / wp.max(count, wp.float64(1.0))
 
     @wp.func
-    def drive(bodies: Bodies, clock: wp.array(dtype=wp.float64)):
+    def drive(bodies: Bodies, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
         """Velocities of the driven bodies in the middle of the coming step: linear between the given times."""
         t = clock[wp.static(TIME)] + wp.float64(0.5) * clock[wp.static(TIME_STEP)]
         for body in range(bodies.count):
@@ -75,6 +78,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             v = bodies.velocities[k] + share * (bodies.velocities[k + 1] - bodies.velocities[k])
                 bodies.velocity[body] = v
                 bodies.old_velocity[body] = v
+                look_ahead(bodies, grid, body, F(-0.5) * parameters.spacing, F(clock[wp.static(TIME_STEP)]))
 
     @wp.func
     def carry(bodies: Bodies, grid: Grid, reactions: wp.array(dtype=wp.float64), dt: wp.float64) -> wp.bool:
@@ -104,12 +108,13 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         counters: wp.array(dtype=wp.int32),
         running: wp.array(dtype=wp.int32),
         bodies: Bodies,
+        grid: Grid,
     ):
         go = wp.int32(0)
         if clock[wp.static(TIME)] < clock[wp.static(TARGET)] and counters[wp.static(DIVERGED)] == 0:
             choose_step(parameters, clock, counters)
             if DRIVEN:
-                drive(bodies, clock)
+                drive(bodies, grid, parameters, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
             go = wp.int32(1)
         running[0] = go
@@ -169,7 +174,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
         if go == 1:
             choose_step(parameters, clock, counters)
             if DRIVEN:
-                drive(bodies, clock)
+                drive(bodies, grid, parameters, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
         running[0] = go
 

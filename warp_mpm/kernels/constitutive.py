@@ -60,7 +60,8 @@ def make_constitutive(
     BODIES = effects.bodies
     Bodies = types.Bodies
     set_back = bodies_of.set_back if BODIES else None
-    travel = bodies_of.travel if BODIES else None
+    in_box = bodies_of.in_box if BODIES else None
+    PASSING = effects.passing
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
@@ -148,19 +149,37 @@ def make_constitutive(
         x += displacement(points, p, grid, x, shift, time_step, parameters)
         if BODIES:
             # Bodies and grid as they will lie in the next step: whatever their speed, no point reaches beyond them.
-            if MOVING:
-                if bodies.carrier >= 0:
-                    shift += travel(bodies, bodies.carrier, time_step)[0]
-            x, pushed = set_back(bodies, x, F(-0.5) * parameters.spacing, time_step)
-            if pushed > 0:
-                wp.atomic_add(counters, wp.static(POINTS_PUSHED), pushed)
-
+            shift = F(grid.shift[1])
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
         margin = F(2.0)
         within = (
             sx >= margin and sx < F(parameters.columns) - margin and sy >= margin and sy < F(parameters.rows) - margin
         )
+        if BODIES:
+            solid = wp.int32(1)
+            if within and not PASSING:
+                solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy))
+            if solid != 0:
+                for body in range(bodies.count):
+                    if in_box(read(bodies.ahead, body), x):
+                        seen = x
+                        if MOVING:
+                            seen -= read(bodies.next, body)
+                        first_piece = read(bodies.first_piece, body)
+                        last_piece = read(bodies.first_piece, body + 1)
+                        pushed = set_back(bodies.pieces, first_piece, last_piece, seen, F(-0.5) * parameters.spacing)
+                        if pushed[0] != F(0.0) or pushed[1] != F(0.0):
+                            x += pushed
+                            wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
+                sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
+                sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
+                within = (
+                    sx >= margin
+                    and sx < F(parameters.columns) - margin
+                    and sy >= margin
+                    and sy < F(parameters.rows) - margin
+                )
         if not within:
             # A position that is no number compares false above; such a point has not left, the run has diverged.
             if wp.isfinite(x[0]) and wp.isfinite(x[1]):

@@ -15,7 +15,7 @@ import warp as wp
 from .layout import TIME_STEP
 
 
-def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_contact(types: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build the kernels `press` (over groups of places of contact), and `collect` and `push` (over places) where some
     body slides, and the functions `respond` and `impulse` for its equation of motion."""
     effects = types.effects
@@ -26,7 +26,7 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
     Parameters = types.Parameters
     Contact = types.Contact
     Bodies = types.Bodies
-    surface_velocity_of = bodies_of.surface_velocity
+    MOVING = effects.moving
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     receive = types.scheme.receive
@@ -132,57 +132,6 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         wp.atomic_add(reactions, 2 * surface, wp.float64(force[0]))
         wp.atomic_add(reactions, 2 * surface + 1, wp.float64(force[1]))
 
-    @wp.func
-    def rub(bodies: Bodies, surface: wp.int32) -> F:
-        """Friction coefficient of a surface."""
-        result = F(0.0)
-        if FRICTION:
-            result = bodies.friction[surface]
-        return result
-
-    @wp.func
-    def act(
-        contact: Contact,
-        e: wp.int32,
-        bodies: Bodies,
-        grid: Grid,
-        parameters: Parameters,
-        time_step: F,
-        reactions: wp.array(dtype=wp.float64),
-    ):
-        """What a place of contact does to its node, or to its node and its mirror image."""
-        node = contact.node[e]
-        surface = contact.surface[e]
-        mass = grid.mass[node[0], node[1]]
-        if mass > F(0.0):
-            normal = contact.normal[e]
-            mirror = contact.mirror[e]
-            moving = surface_velocity_of(bodies, contact.body)
-            friction = rub(bodies, surface)
-            velocity = grid.velocity[node[0], node[1]]
-            liquid_free = V2()
-            if CARRIED:
-                liquid_free = grid.liquid_alone[node[0], node[1]]
-            pair = wp.bool(False)
-            if mirror[0] >= 0:
-                other = grid.mass[mirror[0], mirror[1]]
-                if other > F(0.0):
-                    mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
-                    # Where the surface is left but the node behind it is not, it acts alone on what lies behind.
-                    if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
-                        pair = wp.bool(True)
-                        both = F(4.0) * mass * other / (mass + other)
-                        if CARRIED:
-                            liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mirror[0], mirror[1]])
-                        change = respond(both, mean, liquid_free, normal, friction, moving, parameters, time_step)
-                        add(grid, node[0], node[1], change * (F(0.5) * both / mass))
-                        add(grid, mirror[0], mirror[1], change * (F(0.5) * both / other))
-                        record(reactions, surface, impulse(both, change, parameters))
-            if not pair:
-                change = respond(mass, velocity, liquid_free, normal, friction, moving, parameters, time_step)
-                add(grid, node[0], node[1], change)
-                record(reactions, surface, impulse(mass, change, parameters))
-
     @wp.kernel(module=module)
     def press(
         contact: Contact,
@@ -201,9 +150,48 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
             used = grid.block[bi, block - bi * parameters.block_rows] != 0
         if used:
             time_step = F(clock[wp.static(TIME_STEP)])
+            moving = V2()
+            if MOVING:
+                v = bodies.velocity[contact.body]
+                moving = V2(F(v[0]), F(v[1]))
             for e in range(contact.start[group], contact.start[group + 1]):
-                if contact.surface[e] >= 0:
-                    act(contact, e, bodies, grid, parameters, time_step, reactions)
+                surface = contact.surface[e]
+                node = contact.node[e]
+                mass = F(0.0)
+                if surface >= 0:
+                    mass = grid.mass[node[0], node[1]]
+                if mass > F(0.0):
+                    normal = contact.normal[e]
+                    mirror = contact.mirror[e]
+                    friction = F(0.0)
+                    if FRICTION:
+                        friction = bodies.friction[surface]
+                    velocity = grid.velocity[node[0], node[1]]
+                    liquid_free = V2()
+                    if CARRIED:
+                        liquid_free = grid.liquid_alone[node[0], node[1]]
+                    other = F(0.0)
+                    if mirror[0] >= 0:
+                        other = grid.mass[mirror[0], mirror[1]]
+                    if other > F(0.0):
+                        mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
+                        # Where the surface is left but the node behind it is not, it acts alone on what lies behind.
+                        if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
+                            velocity = mean
+                            if CARRIED:
+                                liquid_free = F(0.5) * (liquid_free + grid.liquid_alone[mirror[0], mirror[1]])
+                        else:
+                            other = F(0.0)
+                    both = mass
+                    if other > F(0.0):
+                        both = F(4.0) * mass * other / (mass + other)
+                    change = respond(both, velocity, liquid_free, normal, friction, moving, parameters, time_step)
+                    if other > F(0.0):
+                        add(grid, node[0], node[1], change * (F(0.5) * both / mass))
+                        add(grid, mirror[0], mirror[1], change * (F(0.5) * both / other))
+                    else:
+                        add(grid, node[0], node[1], change)
+                    record(reactions, surface, impulse(both, change, parameters))
 
     kernels: dict[str, Any] = {"press": press}
 
@@ -227,7 +215,8 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
                 if mirror[0] >= 0:
                     other = grid.mass[mirror[0], mirror[1]]
                     if other > F(0.0):
-                        moving = surface_velocity_of(bodies, contact.body)
+                        v = bodies.velocity[contact.body]
+                        moving = V2(F(v[0]), F(v[1]))
                         normal = contact.normal[e]
                         mean = F(0.5) * (velocity + grid.velocity[mirror[0], mirror[1]])
                         if leaves(velocity, normal, moving, parameters) or not leaves(mean, normal, moving, parameters):
@@ -260,6 +249,10 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
                 node = contact.node[e]
                 mirror = contact.mirror[e]
                 surface = contact.surface[e]
+                v = bodies.velocity[contact.body]
+                friction = F(0.0)
+                if FRICTION:
+                    friction = bodies.friction[surface]
                 liquid_free = V2()
                 if CARRIED:
                     if e < contact.liquid_free.shape[0]:
@@ -269,8 +262,8 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    rub(bodies, surface),
-                    surface_velocity_of(bodies, contact.body),
+                    friction,
+                    V2(F(v[0]), F(v[1])),
                     parameters,
                     time_step,
                 )
@@ -284,4 +277,4 @@ def make_contact(types: SimpleNamespace, bodies_of: SimpleNamespace, module: str
         kernels["collect"] = collect
         kernels["push"] = push
 
-    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse, rub=rub)
+    return SimpleNamespace(kernels=kernels, respond=respond, impulse=impulse)

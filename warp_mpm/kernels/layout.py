@@ -15,7 +15,7 @@ from typing import Any
 import warp as wp
 
 from ..effects import Effects
-from ..simulator.bodies.kernels import body_fields, contact_fields
+from ..simulator.bodies.kernels import PIECE, body_fields, contact_fields
 
 BLOCK_SHIFT = 3
 BLOCK = 1 << BLOCK_SHIFT
@@ -112,8 +112,9 @@ def layout(effects: Effects) -> SimpleNamespace:
     V = wp.types.vector(components, scalar)
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
+    P = wp.types.vector(PIECE, scalar)
     array = wp.array
-    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, components=components)
+    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
 
     points: dict[str, Any] = {
         "position": array(dtype=V2),
@@ -149,7 +150,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
         "velocity": array(dtype=V, ndim=2),  # `scatter` leaves the momentum here, `move` divides it by the mass
-        "shift": array(dtype=wp.float64),  # displacement of the grid along x since the start [m]
+        "shift": array(dtype=wp.float64),  # of the grid along x since the start: now, and at the end of the step [m]
         "block": array(dtype=wp.int32, ndim=2),
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
@@ -162,6 +163,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["liquid_alone"] = array(dtype=V2, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
+    if effects.bodies and not effects.passing:
+        grid["solid"] = array(dtype=wp.int32, ndim=2)  # 1: a point in the cell may be too deep in a body
     if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
     if effects.density_correction:
@@ -213,8 +216,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
         parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
-    bodies = body_fields(effects, scalar, V2, V4)
-    contact = contact_fields(effects, scalar, V2, V) if effects.bodies else {}
+    bodies = body_fields(effects, scalar, V2, V4, P)
+    contact = contact_fields(effects, scalar, V2, V, P) if effects.bodies else {}
 
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)

@@ -13,7 +13,9 @@ SECANTS = 12
 impulse jumps at some velocity of the barrier, at which a node is let go; only halving closes in on that."""
 
 
-def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_rigid_barrier(
+    types: SimpleNamespace, contact: SimpleNamespace, bodies_of: SimpleNamespace, module: str
+) -> SimpleNamespace:
     """Build the kernel `slide` (one thread): the velocity at the end of the step of the
     body that `contact` belongs to.
 
@@ -29,11 +31,12 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     F = types.scalar
     V2 = types.V2
     Contact = types.Contact
-    Bodies = types.Bodies
+    Bodies, Grid = types.Bodies, types.Grid
     Parameters = types.Parameters
     respond = contact.respond
     impulse = contact.impulse
-    rub = contact.rub
+    FRICTION = types.effects.friction
+    look_ahead = bodies_of.look_ahead
     CARRIED = types.effects.friction and types.effects.liquid
     # Relative width of a bracket that cannot be closed any further, as impulses are rounded to the scalar's precision,
     # and of one in which the velocity counts as found.
@@ -48,6 +51,9 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
         for e in range(contact.mass.shape[0]):
             mass = contact.mass[e]
             if mass > F(0.0):
+                friction = F(0.0)
+                if FRICTION:
+                    friction = bodies.friction[contact.surface[e]]
                 liquid_free = V2()
                 if CARRIED:
                     if e < contact.liquid_free.shape[0]:
@@ -57,7 +63,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
                     contact.velocity[e],
                     liquid_free,
                     contact.normal[e],
-                    rub(bodies, contact.surface[e]),
+                    friction,
                     surface_velocity,
                     parameters,
                     time_step,
@@ -70,6 +76,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
     def slide(
         contact: Contact,
         bodies: Bodies,
+        grid: Grid,
         parameters: Parameters,
         clock: wp.array(dtype=wp.float64),
         counters: wp.array(dtype=wp.int32),
@@ -141,6 +148,7 @@ def make_rigid_barrier(types: SimpleNamespace, contact: SimpleNamespace, module:
         else:
             friction = drive
         bodies.velocity[body] = wp.vec2d(new, zero)
+        look_ahead(bodies, grid, body, F(-0.5) * parameters.spacing, time_step)
         middle = wp.float64(0.5) * (old + new)
         bodies.base_impulse[body] = bodies.base_impulse[body] - friction
         bodies.base_work[body] = bodies.base_work[body] + friction * middle

@@ -55,8 +55,8 @@ def make_transfer(
     VISCOSITY = effects.bulk_viscosity
     EXTRA_STRESS = effects.skeleton.extra_stress
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
-    near = bodies_of.near if LIQUID_ALONE else None
-    displaced = bodies_of.displaced if LIQUID_ALONE else None
+    in_hull = bodies_of.in_hull if LIQUID_ALONE else None
+    MOVING = effects.moving
     Bodies = types.Bodies
     POROSITY = effects.porosity_update
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
@@ -200,8 +200,15 @@ def make_transfer(
             # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
             for body in range(bodies.count):
-                if bodies.rubs[body] == 1:
-                    if near(bodies, body, x - displaced(bodies, body), F(3.0) * parameters.spacing):
+                if read(bodies.rubs, body) == 1:
+                    seen = x
+                    if MOVING:
+                        moved = bodies.displacement[body]
+                        seen -= V2(F(moved[0]), F(moved[1]))
+                    reach = F(3.0) * parameters.spacing
+                    first_piece = read(bodies.first_piece, body)
+                    last_piece = read(bodies.first_piece, body + 1)
+                    if in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
                         rubbed = wp.bool(True)
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.

@@ -26,7 +26,7 @@ class Launch:
     """The body that it acts for."""
 
 
-START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies"), "begins an interval")
+START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies", "grid"), "begins an interval")
 LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "sums"), "sums over the points, for a sample")
 
 
@@ -69,7 +69,7 @@ def _contact(body: Body, passing: bool) -> list[Launch]:
     seen = ("contact", "bodies", "grid", "parameters")
     found = [Launch("place", "places", seen, "finds the nodes of a body that passes", body.name)] if passing else []
     if isinstance(body.motion, Sliding):
-        takes = ("contact", "bodies", "parameters", "clock", "counters")
+        takes = (*seen, "clock", "counters")
         return [
             *found,
             Launch("collect", "places", seen, "what the body's surface sees of the flow", body.name),

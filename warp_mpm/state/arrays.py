@@ -17,7 +17,7 @@ from ..kernels import layout as at
 from ..scenario import Scenario
 from ..simulator.bodies import Body
 from ..simulator.bodies.arrays import Group, filled
-from ..simulator.bodies.room import open_corner_volumes
+from ..simulator.bodies.room import open_corner_volumes, solid_cells
 
 
 def point_arrays(
@@ -55,8 +55,10 @@ def grid_arrays(
     """Nodes, corners of the smoothing grid, and the list of blocks in use."""
     blocks = (grid.columns // at.BLOCK, grid.rows // at.BLOCK)
     shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.columns, grid.rows))
-    shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 1}
-    given = {}
+    shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 2}
+    given: dict[str, Any] = {}
+    if effects.bodies and not effects.passing:
+        given["solid"] = solid_cells(bodies, grid)
     if effects.smoothing_grid:
         given["corner_room"] = 1.0 / open_corner_volumes(bodies, grid)
     if effects.density_correction:

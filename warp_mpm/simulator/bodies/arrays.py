@@ -97,16 +97,14 @@ def body_arrays(
     given: dict[str, Any] = {"count": count}
     if effects.bodies:
         pieces = [body.outline.segments for body in bodies]
+        boxes = np.array([_box(body, bodies, grid) for body in bodies])
         given |= {
             "first_piece": _firsts([len(piece) for piece in pieces]),
             "first_surface": _firsts([len(body.surfaces) for body in bodies]),
-            "box": np.array([_box(body, bodies, grid) for body in bodies]),
-            "begin": np.concatenate([piece.begin for piece in pieces]),
-            "along": np.concatenate([piece.along for piece in pieces]),
-            "low": np.concatenate([piece.low for piece in pieces]),
-            "high": np.concatenate([piece.high for piece in pieces]),
-            "normal": np.concatenate([piece.normal for piece in pieces]),
-            "offset": np.concatenate([piece.offset for piece in pieces]),
+            "box": boxes,
+            "ahead": boxes + 0.5 * grid.spacing * np.array([1.0, -1.0, 1.0, -1.0]),
+            "pieces": np.concatenate([piece.numbers for piece in pieces]),
+            "hull": np.concatenate([piece.hull for piece in pieces]),
         }
     if effects.friction:
         given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
@@ -196,13 +194,7 @@ def _window(body: Body, grid: GridLayout, types: SimpleNamespace) -> dict[str, A
         "places": columns * rows,
         "block": np.full(columns, -1, dtype=np.int32),
         "start": (np.arange(columns + 1) * rows).astype(np.int32),
-        "first_piece": np.array([0, len(acting.outline)], dtype=np.int32),
-        "begin": acting.outline.begin,
-        "along": acting.outline.along,
-        "low": acting.outline.low,
-        "high": acting.outline.high,
-        "normals": acting.outline.normal,
-        "offset": acting.outline.offset,
+        "pieces": acting.outline.numbers,
         "crest": np.minimum(acting.crest, ENDLESS),
         "surfaces": np.array(body.surface_of_piece, dtype=np.int32),
         "corner": types.V2(max(box[0] - reach, -ENDLESS), max(box[2] - reach, -ENDLESS)),

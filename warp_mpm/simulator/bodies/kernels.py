@@ -9,8 +9,11 @@ from warp_mpm.effects import Effects
 
 from .outline import TIE
 
+PIECE = 9
+"""Numbers of a piece: begin (x, y), along (x, y), low, high, normal (x, y), offset, as in `outline.Segments`."""
 
-def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any) -> dict[str, Any]:
+
+def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict[str, Any]:
     """Fields of the structure `Bodies` for `effects`: B bodies, S surfaces, G pieces of their outlines."""
     array = wp.array
     fields: dict[str, Any] = {"count": wp.int32}
@@ -21,13 +24,11 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any) -> dict[str, An
             "first_surface": array(dtype=wp.int32),
             # [B] around the solid, and whatever lies beyond it; nothing of an edge of the domain.
             "box": array(dtype=V4),
-            # [G] as in `outline.Segments`.
-            "begin": array(dtype=V2),
-            "along": array(dtype=V2),
-            "low": array(dtype=scalar),
-            "high": array(dtype=scalar),
-            "normal": array(dtype=V2),
-            "offset": array(dtype=scalar),
+            # [B] where a point may come to lie too deep in the body at the end of the step, as seen by the points.
+            "ahead": array(dtype=V4),
+            "pieces": array(dtype=P),  # [G]
+            # [G] offset of those pieces on whose line's one side the whole body lies, far away of the others.
+            "hull": array(dtype=scalar),
         }
     if effects.friction:
         fields["friction"] = array(dtype=scalar)  # [S]
@@ -38,6 +39,7 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any) -> dict[str, An
             "displacement": array(dtype=wp.vec2d),  # [B] since the start [m]
             "velocity": array(dtype=wp.vec2d),  # [B] [m/s]
             "old_velocity": array(dtype=wp.vec2d),  # [B] a step before
+            "next": array(dtype=V2),  # [B] displacement at the end of the step [m]
             "impulse": array(dtype=wp.vec2d),  # [B] of the flow on the body since the start [N s/m]
             "work": array(dtype=wp.float64),  # [B] of the flow on the body since the start [J/m]
         }
@@ -59,7 +61,7 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any) -> dict[str, An
     return fields
 
 
-def contact_fields(effects: Effects, scalar: Any, V2: Any, V: Any) -> dict[str, Any]:
+def contact_fields(effects: Effects, scalar: Any, V2: Any, V: Any, P: Any) -> dict[str, Any]:
     """Fields of the structure `Contact`, one per body: its C places of contact, in groups that share a block."""
     array = wp.array
     fields: dict[str, Any] = {
@@ -81,13 +83,7 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V: Any) -> dict[str, 
     if effects.passing:
         # Of the outline behind whose pieces nodes act, and its window of nodes, by which the places are found anew.
         fields |= {
-            "first_piece": array(dtype=wp.int32),
-            "begin": array(dtype=V2),
-            "along": array(dtype=V2),
-            "low": array(dtype=scalar),
-            "high": array(dtype=scalar),
-            "normals": array(dtype=V2),
-            "offset": array(dtype=scalar),
+            "pieces": array(dtype=P),
             "crest": array(dtype=scalar),
             "surfaces": array(dtype=wp.int32),
             "corner": V2,
@@ -99,39 +95,41 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V: Any) -> dict[str, 
     return fields
 
 
-def make_body_functions(types: SimpleNamespace) -> SimpleNamespace:
-    """Build the functions `nearest`, `travel`, `displaced`, `surface_velocity`, `near` and `set_back`."""
+def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> SimpleNamespace:
+    """Build the functions `nearest`, `normal_of`, `travel`, `displaced`, `in_box`, `in_hull`, `look_ahead`, `set_back`.
+
+    Each array that a kernel might look at costs it a load per thread, whether or not it does: kernels over points name
+    few of them, and by `read`.
+    """
     effects = types.effects
     F = types.scalar
     V2 = types.V2
     V4 = types.V4
-    Bodies = types.Bodies
+    P = types.P
+    Bodies, Grid = types.Bodies, types.Grid
+    read = elementary.read
     MOVING = effects.moving
     SAME = TIE if effects.precision == "float64" else 1e-6
 
-    vectors, numbers = wp.array(dtype=V2), wp.array(dtype=F)
+    pieces_of = wp.array(dtype=P)
+    numbers = wp.array(dtype=F)
 
     @wp.func
-    def nearest(
-        begin: vectors,
-        along: vectors,
-        low: numbers,
-        high: numbers,
-        normal: vectors,
-        offset: numbers,
-        first: wp.int32,
-        last: wp.int32,
-        place: V2,
-    ):
+    def normal_of(piece: P) -> V2:
+        return V2(piece[6], piece[7])
+
+    @wp.func
+    def nearest(pieces: pieces_of, first: wp.int32, last: wp.int32, place: V2):
         """Signed distance, outward normal and nearest piece, as `outline.Segments.nearest`."""
         best = F(1.0e30)
         facing = F(0.0)
         over = F(0.0)
-        piece = first
+        found = first
         for k in range(first, last):
-            across = wp.abs(wp.dot(normal[k], place) - offset[k])
-            t = wp.dot(place - begin[k], along[k])
-            beyond = wp.max(wp.max(low[k] - t, t - high[k]), F(0.0))
+            piece = read(pieces, k)
+            across = wp.abs(wp.dot(normal_of(piece), place) - piece[8])
+            t = wp.dot(place - V2(piece[0], piece[1]), V2(piece[2], piece[3]))
+            beyond = wp.max(wp.max(piece[4] - t, t - piece[5]), F(0.0))
             distance = across
             if beyond > F(0.0):
                 distance = wp.sqrt(across * across + beyond * beyond)
@@ -143,24 +141,18 @@ def make_body_functions(types: SimpleNamespace) -> SimpleNamespace:
                 best = distance
                 facing = across
                 over = beyond
-                piece = k
-        distance = wp.dot(normal[piece], place) - offset[piece]
-        direction = normal[piece]
+                found = k
+        one = read(pieces, found)
+        direction = normal_of(one)
+        distance = wp.dot(direction, place) - one[8]
         if over > F(0.0):
             distance = wp.where(distance < F(0.0), -best, best)
-            t = wp.clamp(wp.dot(place - begin[piece], along[piece]), low[piece], high[piece])
+            begin = V2(one[0], one[1])
+            along = V2(one[2], one[3])
+            t = wp.clamp(wp.dot(place - begin, along), one[4], one[5])
             if distance != F(0.0):
-                direction = (place - begin[piece] - t * along[piece]) / distance
-        return distance, direction, piece
-
-    @wp.func
-    def surface_velocity(bodies: Bodies, body: wp.int32) -> V2:
-        """[m/s], of a body that may move."""
-        result = V2()
-        if MOVING:
-            v = bodies.velocity[body]
-            result = V2(F(v[0]), F(v[1]))
-        return result
+                direction = (place - begin - t * along) / distance
+        return distance, direction, found
 
     @wp.func
     def travel(bodies: Bodies, body: wp.int32, time_step: F) -> V2:
@@ -182,48 +174,44 @@ def make_body_functions(types: SimpleNamespace) -> SimpleNamespace:
         return result
 
     @wp.func
-    def within(box: V4, place: V2, margin: F) -> wp.bool:
-        return (
-            place[0] > box[0] - margin
-            and place[0] < box[1] + margin
-            and place[1] > box[2] - margin
-            and place[1] < box[3] + margin
+    def in_box(box: V4, place: V2) -> wp.bool:
+        return place[0] > box[0] and place[0] < box[1] and place[1] > box[2] and place[1] < box[3]
+
+    @wp.func
+    def in_hull(pieces: pieces_of, hull: numbers, first: wp.int32, last: wp.int32, place: V2, margin: F) -> wp.bool:
+        """Whether `place` lies within `margin` [m] of the hull of an outline."""
+        for k in range(first, last):
+            if wp.dot(normal_of(read(pieces, k)), place) - read(hull, k) >= margin:
+                return False
+        return True
+
+    @wp.func
+    def look_ahead(bodies: Bodies, grid: Grid, body: wp.int32, depth: F, time_step: F):
+        """Note where a body whose velocity in this step is known will be, and the grid if it rides with it."""
+        moved = displaced(bodies, body) + travel(bodies, body, time_step)
+        box = bodies.box[body]
+        bodies.next[body] = moved
+        if body == bodies.carrier:
+            middle = wp.float64(0.5) * (bodies.velocity[body][0] + bodies.old_velocity[body][0])
+            grid.shift[1] = grid.shift[0] + wp.float64(time_step) * middle
+        bodies.ahead[body] = V4(
+            box[0] - depth + moved[0], box[1] + depth + moved[0], box[2] - depth + moved[1], box[3] + depth + moved[1]
         )
 
     @wp.func
-    def near(bodies: Bodies, body: wp.int32, place: V2, reach: F) -> wp.bool:
-        """Whether `place`, seen from the body, lies inside it or within `reach` [m] of it."""
-        result = wp.bool(False)
-        if within(bodies.box[body], place, reach):
-            distance, _normal, _piece = nearest(
-                bodies.begin, bodies.along, bodies.low, bodies.high, bodies.normal, bodies.offset,
-                bodies.first_piece[body], bodies.first_piece[body + 1], place,
-            )  # fmt: skip
-            result = distance < reach
-        return result
-
-    @wp.func
-    def set_back(bodies: Bodies, place: V2, depth: F, time_step: F):
-        """Where a point at `place` goes that may lie `-depth` [m] deep in a body at most, and how many moved it."""
-        count = wp.int32(0)
-        for body in range(bodies.count):
-            seen = place - (displaced(bodies, body) + travel(bodies, body, time_step))
-            if within(bodies.box[body], seen, depth):
-                distance, normal, _piece = nearest(
-                    bodies.begin, bodies.along, bodies.low, bodies.high, bodies.normal, bodies.offset,
-                    bodies.first_piece[body], bodies.first_piece[body + 1], seen,
-                )  # fmt: skip
-                if distance < depth:
-                    place += (depth - distance) * normal
-                    count += 1
-        return place, count
+    def set_back(pieces: pieces_of, first: wp.int32, last: wp.int32, seen: V2, depth: F) -> V2:
+        """How a point is moved [m] that may lie `-depth` [m] deep in a body at most and is `seen` from it."""
+        distance, direction, _piece = nearest(pieces, first, last, seen)
+        return wp.max(depth - distance, F(0.0)) * direction
 
     return SimpleNamespace(
         nearest=nearest,
+        normal_of=normal_of,
         travel=travel,
         displaced=displaced,
-        surface_velocity=surface_velocity,
-        near=near,
+        in_box=in_box,
+        in_hull=in_hull,
+        look_ahead=look_ahead,
         set_back=set_back,
     )
 
@@ -234,7 +222,7 @@ def make_place(types: SimpleNamespace, functions: SimpleNamespace, module: str) 
     F = types.scalar
     V2 = types.V2
     Contact, Bodies, Grid, Parameters = types.Contact, types.Bodies, types.Grid, types.Parameters
-    nearest, displaced = functions.nearest, functions.displaced
+    nearest, normal_of, displaced = functions.nearest, functions.normal_of, functions.displaced
 
     @wp.kernel(module=module)
     def place(contact: Contact, bodies: Bodies, grid: Grid, parameters: Parameters):
@@ -243,9 +231,10 @@ def make_place(types: SimpleNamespace, functions: SimpleNamespace, module: str) 
         spacing = parameters.spacing
         origin = V2(parameters.left + F(grid.shift[0]), parameters.bottom)
         if contact.edge == 1:
-            n = contact.normals[0]
+            edge = contact.pieces[0]
+            n = normal_of(edge)
             axis = V2(wp.abs(n[0]), wp.abs(n[1]))
-            line = (contact.offset[0] * (n[0] + n[1]) - wp.dot(axis, origin)) * parameters.inverse_spacing
+            line = (edge[8] * (n[0] + n[1]) - wp.dot(axis, origin)) * parameters.inverse_spacing
             at += ((wp.floor(line + F(0.5)) - line) * spacing) * axis
         i = wp.int32(0)
         j = wp.int32(0)
@@ -259,17 +248,14 @@ def make_place(types: SimpleNamespace, functions: SimpleNamespace, module: str) 
         mirror = wp.vec2i(-1, -1)
         if i >= 0 and i < parameters.columns and j >= 0 and j < parameters.rows:
             seen = origin + spacing * V2(F(i) + F(0.5), F(j) + F(0.5)) - at
-            distance, _direction, piece = nearest(
-                contact.begin, contact.along, contact.low, contact.high, contact.normals, contact.offset,
-                0, contact.first_piece[1], seen,
-            )  # fmt: skip
+            distance, _direction, piece = nearest(contact.pieces, 0, contact.pieces.shape[0], seen)
             distance *= parameters.inverse_spacing
             acts = distance < F(0.0) and distance > -contact.depth
             if contact.edge == 0 and distance > F(-0.5):
                 acts = acts and seen[1] <= contact.crest[piece] - spacing * F(1.0 - 1.0e-9)
             if acts:
                 surface = contact.surfaces[piece]
-                normal = contact.normals[piece]
+                normal = normal_of(contact.pieces[piece])
                 contact.normal[e] = normal
                 if contact.edge == 1 and distance > F(-1.0):
                     mi = i + wp.int32(normal[0])

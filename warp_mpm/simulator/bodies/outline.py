@@ -47,6 +47,22 @@ class Segments:
     def __len__(self) -> int:
         return len(self.offset)
 
+    @property
+    def numbers(self) -> Array:
+        """All of a piece in a row [G, 9], in the order of the fields."""
+        columns = (self.begin, self.along, self.low[:, None], self.high[:, None], self.normal, self.offset[:, None])
+        return np.concatenate(columns, axis=1)
+
+    @cached_property
+    def hull(self) -> Array:
+        """Offset [G] of those pieces on whose line's one side the whole solid lies; ENDLESS of the others."""
+        ends = [self.begin, self.begin + np.where(self.high < ENDLESS, self.high, 1.0)[:, None] * self.along]
+        if not self.closed:
+            ends.append(self.begin[:1] - self.along[:1])
+        corners = np.concatenate(ends)
+        above = self.plane(corners).max(axis=1)
+        return np.where(above <= 1e-9 * (1.0 + np.abs(corners).max()), self.offset, ENDLESS)
+
     def plane(self, place: Array) -> Array:
         """Distance [G, N] of `place` [N, 2] from the lines, negative on the solid's side."""
         x, y = place[:, 0], place[:, 1]

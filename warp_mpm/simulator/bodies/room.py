@@ -46,6 +46,20 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
     return np.maximum(share, 0.125) * spacing**2
 
 
+def solid_cells(bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.int32]:
+    """1 where a point in the cell around a node [columns, rows] may be half a cell deep in a body that lies still as
+    seen from the grid; an edge of the domain sets no point back."""
+    x, y = grid.node_positions()
+    window = (x[0] - grid.spacing, x[-1] + grid.spacing, y[0] - grid.spacing, y[-1] + grid.spacing)
+    found = np.zeros((grid.columns, grid.rows), dtype=np.int32)
+    # From the middle of a cell to its corner it is 0.71 cells.
+    near = 0.25 * grid.spacing
+    for body in bodies:
+        if not body.edge:
+            found[_distance(body.outline.segments, x, y, window, grid.spacing) < near] = 1
+    return found
+
+
 def _set_back(body: Body, depth: float) -> Segments:
     pieces = body.outline.segments
     inclined = (pieces.normal != 0.0).all(axis=1)
@@ -56,6 +70,8 @@ def _distance(
     solid: Segments, x: NDArray[Any], y: NDArray[Any], window: tuple[float, ...], spacing: float
 ) -> NDArray[np.float64]:
     """Distance [columns, rows] of the corners from the outline; infinite outside the box of a closed one."""
+    if len(solid) == 1 and solid.normal[0, 0] == 0.0:
+        return np.broadcast_to(solid.normal[0, 1] * y - solid.offset[0], (len(x), len(y)))
     low = np.full((len(x), len(y)), np.inf)
     columns, rows = np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool)
     if solid.closed:
