@@ -24,8 +24,9 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice.
 test: lint
-	$(BIN)/python -m pytest -n $(JOBS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 validate: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
