@@ -457,6 +457,18 @@ class TestCommand:
         assert (tmp_path / "run" / "summary.json").exists()
         assert list((tmp_path / "cache" / "purchases").iterdir())
 
+    def test_interrupted_while_it_probes(self, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        from warp_mpm.accuracy import pace
+
+        def interrupted(self: Any, *arguments: Any) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(pace.Machine, "measure", interrupted)
+        result = CliRunner().invoke(app, ["run", str(scene), "--accuracy", "50%", "--out", str(tmp_path / "run")])
+        assert result.exit_code == 130
+        assert "Interrupted while the scene was probed" in result.stderr
+        assert not (tmp_path / "run").exists()
+
     def test_a_terminal_is_asked(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from warp_mpm.commands import options
 
