@@ -140,8 +140,8 @@ class Offer:
         parts = ", ".join(f"{QUANTITIES[name].label} {error:.1%}" for name, error in off.items())
         beyond = [QUANTITIES[name].label for name, error in off.items() if error > 2.0 * self.errors[name]]
         warning = (
-            f" That is more than twice what was expected of {', '.join(beyond)}: the coarse runs led elsewhere, and only "
-            "a finer run can tell how far off this one is."
+            f" That is more than twice what was expected of {', '.join(beyond)}: the coarse runs led elsewhere, and "
+            "only a finer run can tell how far off this one is."
         )
         total = f"{cpu_time:.3g} s of the processor in all"
         if self.probing:
