@@ -152,6 +152,19 @@ class TestTime:
         )
 
 
+class TestSettled:
+    @pytest.mark.parametrize(("force", "warned"), [(4.0e5, False), (4.3e5, False), (4.5e5, True)])
+    def test_says_where_the_run_is_not_what_was_expected(
+        self, force: float, warned: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        figures = {"peak_force": force, "impulse": 1e6, "wall_time": 3.0}
+        monkeypatch.setattr(purchase, "figures_of", lambda run: figures)
+        errors, values = {"peak_force": 0.05, "impulse": 0.01}, {"peak_force": 4e5, "impulse": 1e6}
+        text = Offer(0.2, 5.0, 2.0, errors, values, "a probe", probing=1.0).settled(Path(), 6.5)
+        assert "6.5 s of the processor and with probing 7.5 s in all, 1.2 times what was expected" in text
+        assert ("more than twice what was expected of peak force" in text) == warned
+
+
 class TestBudgetThatIsShort:
     def test_refuses_before_anything_is_run(self, dry: Scenario) -> None:
         bench = MadeUp()
@@ -456,6 +469,18 @@ class TestCommand:
         assert done.exit_code == 0, done.stderr
         assert (tmp_path / "run" / "summary.json").exists()
         assert list((tmp_path / "cache" / "purchases").iterdir())
+
+    def test_interrupted_while_it_probes(self, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        from warp_mpm.accuracy import pace
+
+        def interrupted(self: Any, *arguments: Any) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(pace.Machine, "measure", interrupted)
+        result = CliRunner().invoke(app, ["run", str(scene), "--accuracy", "50%", "--out", str(tmp_path / "run")])
+        assert result.exit_code == 130
+        assert "Interrupted while the scene was probed" in result.stderr
+        assert not (tmp_path / "run").exists()
 
     def test_a_terminal_is_asked(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from warp_mpm.commands import options

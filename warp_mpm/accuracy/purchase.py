@@ -130,10 +130,16 @@ class Offer:
                 the wall time.
         """
         figures = figures_of(run)
-        parts = ", ".join(
-            f"{QUANTITIES[name].label} {abs(figures[name] - value) / abs(value):.1%}"
+        off = {
+            name: abs(figures[name] - value) / abs(value)
             for name, value in self.values.items()
             if figures.get(name) is not None and value
+        }
+        parts = ", ".join(f"{QUANTITIES[name].label} {error:.1%}" for name, error in off.items())
+        beyond = [QUANTITIES[name].label for name, error in off.items() if error > 2.0 * self.errors[name]]
+        warning = (
+            f" That is more than twice what was expected of {', '.join(beyond)}: the coarse runs led elsewhere, and "
+            "only a finer run can tell how far off this one is."
         )
         total = f"{cpu_time:.3g} s of the processor in all"
         if self.probing:
@@ -141,7 +147,7 @@ class Offer:
         return (
             f"Got: {figures['wall_time']:.2g} s for the steps and their records, {total}, "
             f"{(cpu_time + self.probing) / (self.time + self.probing):.2g} times what was expected; away from the "
-            f"values expected on the finest grids: {parts}."
+            f"values expected on the finest grids: {parts}.{warning if beyond else ''}"
         )
 
 

@@ -153,7 +153,7 @@ def bought(
         yes: what takes long is agreed to.
 
     Raises:
-        typer.Exit: 2, after one sentence, where it cannot be had.
+        typer.Exit: 2, after one sentence, where it cannot be had; 130 where it was interrupted.
     """
     with refusals():
         from warp_mpm.accuracy.kept import Kept
@@ -161,15 +161,24 @@ def bought(
         from warp_mpm.accuracy.purchase import buy, percent, seconds
 
         say = (lambda sentence: None) if quiet else (lambda sentence: typer.echo(sentence, err=True))
-        offer = buy(
-            scenario,
-            accuracy=None if accuracy is None else percent(accuracy),
-            budget=None if budget is None else seconds(budget),
-            bench=Machine(device),
-            kept=Kept.of(scenario, device),
-            agree=lambda what: yes or agreed(f"{what}. Begin?"),
-            on_probe=say,
-        )
+        asked = {
+            "accuracy": None if accuracy is None else percent(accuracy),
+            "budget": None if budget is None else seconds(budget),
+        }
+        kept = Kept.of(scenario, device)
+        try:
+            offer = buy(
+                scenario,
+                **asked,
+                bench=Machine(device),
+                kept=kept,
+                agree=lambda what: yes or agreed(f"{what}. Begin?"),
+                on_probe=say,
+            )
+        except KeyboardInterrupt:
+            also = " The probes that ended are kept." if kept.lasting else ""
+            complain(f"Interrupted while the scene was probed; nothing was begun.{also}")
+            raise typer.Exit(INTERRUPTED) from None
         say(offer.described())
         return offer, scenario.replaced({"numerics.spacing_m": offer.spacing})
 
