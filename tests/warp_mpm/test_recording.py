@@ -125,7 +125,7 @@ def test_columns_promised_to_users():
 
 def test_quantity_without_a_unit_is_refused(tmp_path):
     clock = Clock()
-    clock.sample = lambda: {"time": 0.0, "mystery": 1.0}
+    clock.sample = lambda names, *, since: {"time": 0.0, "mystery": 1.0}
     with pytest.raises(KeyError, match="No unit is registered for mystery"):
         TimeSeriesRecorder(tmp_path / "series.csv", 0.1).record(clock)
 
