@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from warp_mpm.extras import missing
 from warp_mpm.recording import run_folder
-from warp_mpm.recording.quantities import POINT_FIELDS, TIME_SERIES
+from warp_mpm.recording.quantities import POINT_FIELDS, TIME_SERIES, time_series_quantity
+from warp_mpm.recording.time_series import key_of
 from warp_mpm.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -212,11 +213,12 @@ class Results:
         pd = _optional("Results.frame()", "pandas")
 
         series = self.time_series
-        known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
+        columns_known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
+        known = {name: columns_known.get(name) or time_series_quantity(name) for name in series}
         columns = {name: values for name, values in series.items() if name != "time"}
         frame = pd.DataFrame(columns, index=pd.Index(series["time"], name="time"))
-        frame.attrs["units"] = {name: known[name].unit for name in series}
-        frame.attrs["meanings"] = {name: known[name].meaning for name in series}
+        frame.attrs["units"] = {name: quantity.unit for name, quantity in known.items() if quantity}
+        frame.attrs["meanings"] = {name: quantity.meaning for name, quantity in known.items() if quantity}
         return frame
 
     def dataset(self) -> Any:
@@ -308,9 +310,9 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
     lines = text.split("\n")[:-1]  # what follows the last line's end is empty, or a line that was cut off
     if not lines:
         raise ResultsError(f"{path} is empty.")
-    names = {quantity.label: quantity.name for quantity in TIME_SERIES.values()}
     header = lines[0].split(",")
-    unknown = [label for label in header if label not in names]
+    keys = {label: key_of(label) for label in header}
+    unknown = [label for label, key in keys.items() if key is None]
     if unknown:
         raise ResultsError(f"{path} has the column {unknown[0]!r}, which no run writes.")
     values = np.empty((len(lines) - 1, len(header)))
@@ -322,9 +324,10 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
             values[number] = [float(cell) for cell in cells]
         except ValueError:
             raise ResultsError(f"{path} is damaged in line {number + 2}.") from None
+    names = [label.partition(" [")[0] for label in header]
     if not np.isfinite(values).all():
         line, column = np.argwhere(~np.isfinite(values))[0]
         raise ResultsError(
-            f"{path} line {line + 2}: {names[header[column]]} is {values[line, column]:g}, it must be a finite number."
+            f"{path} line {line + 2}: {names[column]} is {values[line, column]:g}, it must be a finite number."
         )
-    return {names[label]: values[:, column] for column, label in enumerate(header)}
+    return {name: values[:, column] for column, name in enumerate(names)}

@@ -1,5 +1,6 @@
 """Bodies: outlines, the contact rule, several of them at once, and those of a script."""
 
+import importlib.util
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -290,6 +291,22 @@ def test_a_run_with_bodies_goes_on_from_its_state():
     assert first.sample() == second.sample()
     np.testing.assert_array_equal(first.points()["position"], second.points()["position"])
     assert first.body_displacement("pillar")[1] < 0.0
+
+
+def test_the_script_of_the_guide(tmp_path):
+    """A pillar and a plate of a script, in a run folder: forces on each, recorded and read again; and resumed."""
+    found = importlib.util.spec_from_file_location("own_body", Path(__file__).parents[2] / "docs/develop/own_body.py")
+    own_body = importlib.util.module_from_spec(found)
+    found.loader.exec_module(own_body)
+    results = own_body.main(tmp_path / "run", spacing=0.5, until=1.0)
+    series = results.time_series
+    for name in ("bow", "stern", "plate"):
+        assert np.isfinite(series[f"{name}_force_x"]).all()
+    assert series["bow_force_x"].max() > 5e4
+    assert abs(series["stern_force_x"]).max() < series["bow_force_x"].max()
+    assert results.frame().attrs["units"]["bow_force_x"] == "N/m"
+    momentum = np.abs(series["momentum_x"]).max()
+    assert np.abs(series["momentum_residual_x"]).max() < 1e-9 * momentum
 
 
 # -- what is absent, what is wrong -------------------------------------------------------------------------------

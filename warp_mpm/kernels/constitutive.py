@@ -61,7 +61,7 @@ def make_constitutive(
     Bodies = types.Bodies
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
-    PASSING = effects.passing
+    RESTING = not effects.passing
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
@@ -158,8 +158,9 @@ def make_constitutive(
         )
         if BODIES:
             solid = wp.int32(1)
-            if within and not PASSING:
-                solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy))
+            if RESTING:
+                if within:
+                    solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy))
             if solid != 0:
                 for body in range(bodies.count):
                     if in_box(read(bodies.ahead, body), x):

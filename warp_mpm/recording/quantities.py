@@ -127,6 +127,19 @@ POINT_FIELDS = _registry(
 """Point arrays of a snapshot, beside the positions."""
 
 
+def time_series_quantity(key: str) -> Quantity | None:
+    """Of a column of `timeseries.csv`, by its key in the samples or its name; None where there is no such column.
+
+    Beside those of `TIME_SERIES`, forces on the surfaces of bodies that a script adds: `NAME_force_x`, `NAME_force_y`.
+    """
+    if key in TIME_SERIES:
+        return TIME_SERIES[key]
+    surface, _, axis = key.rpartition("_force_")
+    if surface and axis in ("x", "y"):
+        return Quantity(key, "N/m", f"force of the flow on {surface} along {axis}; mean over the interval")
+    return None
+
+
 def check_known(names: set[str], registry: dict[str, Quantity]) -> None:
     """Refuse a quantity that has no entry here, since its unit would go unsaid.
 

@@ -8,10 +8,20 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
-from warp_mpm.recording.quantities import TIME_SERIES, check_known
+from warp_mpm.recording.quantities import TIME_SERIES, check_known, time_series_quantity
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 from warp_mpm.state.samples import Window
+
+
+def key_of(label: str) -> str | None:
+    """Key in the samples of the column that `label` heads; None where no run writes such a column."""
+    for key, quantity in TIME_SERIES.items():
+        if quantity.label == label:
+            return key
+    name = label.partition(" [")[0]
+    force = time_series_quantity(name)
+    return name if force is not None and force.label == label else None
 
 
 class TimeSeriesRecorder:
@@ -59,11 +69,11 @@ class TimeSeriesRecorder:
             size = path.stat().st_size
         except (OSError, ValueError) as error:
             raise RunFolderError(f"{path} cannot be read: {error}.") from None
-        names = {quantity.label: key for key, quantity in TIME_SERIES.items()}
-        if size < mark["bytes"] or any(label not in names for label in header):
+        names = {label: key_of(label) for label in header}
+        if size < mark["bytes"] or None in names.values():
             self._file.close()
             raise RunFolderError(f"{path} is damaged: it does not reach to the checkpoint.")
-        self._columns = [names[label] for label in header]
+        self._columns = [key for key in names.values() if key is not None]
         self._file.truncate(mark["bytes"])
         self._file.seek(mark["bytes"])
 
@@ -79,9 +89,10 @@ class TimeSeriesRecorder:
         sample = simulation.sample(self._quantities, since=self._window)
         self._window = simulation.window()
         if not self._columns:
-            check_known(set(sample), TIME_SERIES)
-            self._columns = [name for name in TIME_SERIES if name in sample]
-            self._file.write(",".join(TIME_SERIES[name].label for name in self._columns) + "\n")
+            quantities = {name: time_series_quantity(name) for name in (*TIME_SERIES, *sample) if name in sample}
+            check_known({name for name, quantity in quantities.items() if quantity is None}, TIME_SERIES)
+            self._columns = list(quantities)
+            self._file.write(",".join(quantity.label for quantity in quantities.values() if quantity) + "\n")
         # One write per line, so that a reader at work at the same time sees whole lines.
         self._file.write(",".join(repr(float(sample[name])) for name in self._columns) + "\n")
         self._file.flush()
