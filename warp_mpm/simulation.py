@@ -32,6 +32,15 @@ from .time_step import step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
 
+LOOK_UP = 0.25
+"""Wall time [s] after which the device hands back to the host, which then hears Ctrl-C; a step is never cut."""
+
+FIRST_LOOK_UP = 100_000
+"""Steps times material points until the first time, when nothing has been timed: some hundredths of a second."""
+
+MOST_STEPS_AT_ONCE = 2**30
+"""Bound of the device's counter."""
+
 
 @cache
 def _start_warp() -> None:
@@ -128,6 +137,9 @@ class Simulation:
         self._times = self._clock_arrays["times"]
         self._velocities = self._clock_arrays["velocities"]
         self._target = self._clock[at.TARGET : at.TARGET + 1]
+        self._goes_on = self._running[at.GOES_ON : at.GOES_ON + 1]
+        self._steps_left = self._running[at.STEPS_LEFT : at.STEPS_LEFT + 1]
+        self._steps_at_once = max(1, FIRST_LOOK_UP // self.material_points)
         # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
         self._seen = {name: array.numpy() for name, array in self._clock_arrays.items()} if device.is_cpu else {}
 
@@ -191,7 +203,7 @@ class Simulation:
 
     def _interval(self) -> None:
         self._start()
-        wp.capture_while(self._running, self._step)
+        wp.capture_while(self._goes_on, self._step)
 
     def _sum_up(self) -> None:
         self._sums.zero_()
@@ -231,8 +243,15 @@ class Simulation:
         """Share of the grid's blocks that held material in the last step; all that the grid costs is theirs."""
         return float(self._grid_arrays["active_count"].numpy()[0]) / self._grid_arrays["block"].size
 
-    def advance(self, until: float) -> None:
+    def advance(self, until: float, *, stop: Callable[[], bool] = lambda: False) -> None:
         """Run to the time `until` [s], exactly.
+
+        The device hands back about every quarter of a second, between two steps, so that Ctrl-C is heard. That changes
+        no step: whoever goes on to the same time gets the numbers, bit for bit, of a run without a break.
+
+        Args:
+            until: [s].
+            stop: asked whenever the device hands back; true leaves the simulation at the time that it has reached.
 
         Raises:
             ValueError: `until` lies in the past or is not finite.
@@ -242,9 +261,17 @@ class Simulation:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
         self._target.fill_(until)
         self.prepare()
-        wp.capture_launch(self._graph)
-        if int(self._read("counters")[at.DIVERGED]):
-            raise SimulationDiverged(self._what_diverged())
+        while True:
+            before, begin = self.steps, time.perf_counter()
+            self._steps_left.fill_(self._steps_at_once)
+            wp.capture_launch(self._graph)
+            counters = self._read("counters")  # waits for the device
+            if int(counters[at.DIVERGED]):
+                raise SimulationDiverged(self._what_diverged())
+            if int(counters[at.STEPS]) < before + self._steps_at_once or self.time >= until or stop():
+                return
+            rate = self._steps_at_once / (time.perf_counter() - begin)
+            self._steps_at_once = max(1, min(int(rate * LOOK_UP), MOST_STEPS_AT_ONCE))
 
     def kernel_times(self, until: float) -> dict[str, float]:
         """Run to the time `until` [s] with every kernel launched on its own, and tell the wall time [s] of each.
@@ -253,6 +280,7 @@ class Simulation:
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
         self._target.fill_(until)
+        self._steps_left.fill_(MOST_STEPS_AT_ONCE)
         self._commands = []
         self._start()
         self._step()
@@ -260,7 +288,7 @@ class Simulation:
         self._commands = None
         start.launch()
         spent = dict.fromkeys((name for name, _ in commands), 0.0)
-        while int(self._read("running")[0]):
+        while int(self._read("running")[at.GOES_ON]):
             for name, command in commands:
                 begin = time.perf_counter()
                 command.launch()

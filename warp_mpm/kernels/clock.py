@@ -14,6 +14,7 @@ from .layout import (
     DIVERGED,
     FACE,
     FASTEST,
+    GOES_ON,
     GRAVITY_IMPULSE_X,
     GRAVITY_IMPULSE_Y,
     GRID_SHIFT,
@@ -29,6 +30,7 @@ from .layout import (
     SMALLEST_TIME_STEP,
     SPEED_MAX,
     STEPS,
+    STEPS_LEFT,
     TARGET,
     TIME,
     TIME_STEP,
@@ -95,7 +97,7 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 drive(clock, times, velocities)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
             go = wp.int32(1)
-        running[0] = go
+        running[wp.static(GOES_ON)] = go
 
     @wp.kernel(module=module)
     def tick(
@@ -145,11 +147,15 @@ def make_clock(types: SimpleNamespace, module: str) -> SimpleNamespace:
             counters[wp.static(DIVERGED)] = 1
         if counters[wp.static(DIVERGED)] != 0:
             go = wp.int32(0)
+        # After its share of steps the device lets the host look up. `start` then chooses the next step as is done here.
+        running[wp.static(STEPS_LEFT)] = running[wp.static(STEPS_LEFT)] - 1
+        if running[wp.static(STEPS_LEFT)] <= 0:
+            go = wp.int32(0)
         if go == 1:
             choose_step(parameters, clock, counters)
             if DRIVEN:
                 drive(clock, times, velocities)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
-        running[0] = go
+        running[wp.static(GOES_ON)] = go
 
     return SimpleNamespace(start=start, tick=tick)

@@ -70,6 +70,12 @@ POINTS_PUSHED = 8
 """Times that a point deeper than half a cell in a solid was set back to that depth."""
 COUNTERS_SIZE = 9
 
+# Whether the loop over steps goes on, an int32 array; no part of the state.
+GOES_ON = 0
+STEPS_LEFT = 1
+"""Steps that the device may make before the host looks up; the host says how many."""
+RUNNING_SIZE = 2
+
 # Surfaces on which reactions are recorded: impulse on the surface in x and y, each a pair in one float64 array.
 FACE = 0
 TOP = 1

@@ -14,8 +14,8 @@ class Simulated(Protocol):
     def time(self) -> float:
         """Simulated time [s]."""
 
-    def advance(self, until: float) -> Any:
-        """Step to exactly `until` [s]."""
+    def advance(self, until: float, *, stop: Callable[[], bool]) -> Any:
+        """Step to exactly `until` [s]; `stop` is asked now and then, and true ends the stretch early."""
 
     def sample(self) -> dict[str, float]:
         """Quantities of the whole scene; forces are means since the sample before."""
@@ -81,7 +81,7 @@ def record_until(
         recorders: each is called with the simulation.
         end_time: [s].
         on_step: called after each stretch between records, for instance to show progress.
-        stop: asked after each stretch; true ends the run early, with a last record.
+        stop: asked after each stretch, and by the simulation within it; true ends the run early, with a last record.
         after_records: called with the simulation and `stopping`, before the end, when the records that are due have
             been made and before those that only a stop calls for: a run that goes on from there knows of no stop.
 
@@ -95,7 +95,7 @@ def record_until(
     if after_records is not None and not ended:
         after_records(simulation, stopping=False)
     while not ended:
-        simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]))
+        simulation.advance(min([end_time, *(recorder.schedule.next_time for recorder in recorders)]), stop=stop)
         late = []
         for recorder in recorders:
             if recorder.schedule.due(simulation.time):

@@ -99,7 +99,7 @@ def clock_arrays(scenario: Scenario, effects: Effects, initial: MaterialPoints, 
     return {
         "clock": wp.array(clock, dtype=wp.float64, device=device),
         "counters": wp.zeros(at.COUNTERS_SIZE, dtype=wp.int32, device=device),
-        "running": wp.zeros(1, dtype=wp.int32, device=device),
+        "running": wp.zeros(at.RUNNING_SIZE, dtype=wp.int32, device=device),
         "reactions": wp.zeros(2 * at.SURFACES, dtype=wp.float64, device=device),
         "left": wp.zeros(at.LEFT_SIZE, dtype=wp.float64, device=device),
         "sums": wp.zeros(at.LEDGER_SIZE, dtype=wp.float64, device=device),
