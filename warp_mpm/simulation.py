@@ -21,10 +21,11 @@ from .effect_rules import derive_effects
 from .grid import fit_grid
 from .kernels import layout as at
 from .kernels.build import build_kernels
+from .kernels.cache import initialize_warp, load_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
 from .state import saved
-from .state.arrays import clock_arrays, contact_arrays, grid_arrays, point_arrays
+from .state.arrays import clock_arrays, contact_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import NAMES, SimulationDiverged, what_diverged
 from .state.parameters import kernel_parameters
 from .state.samples import Constants, Totals, sample
@@ -49,13 +50,16 @@ def _start_warp() -> None:
     Warp prints that from C to the file descriptor, so that is where it is caught; anything else is passed on.
     """
     wp.config.log_level = wp.LOG_WARNING
+    if sys.stderr is None:  # a service, or Windows without a console: nothing is shown anyway
+        initialize_warp()
+        return
     sys.stderr.flush()
     stderr = os.dup(2)
     try:
         with tempfile.TemporaryFile() as caught:
             os.dup2(caught.fileno(), 2)
             try:
-                wp.init()
+                initialize_warp()
             finally:
                 os.dup2(stderr, 2)
             caught.seek(0)
@@ -79,6 +83,7 @@ class Simulation:
 
     Raises:
         ValueError: the device does not exist.
+        MemoryError: the device, or this process, may not have what the scene needs.
     """
 
     def __init__(self, scenario: Scenario, *, device: str = "cpu") -> None:
@@ -99,10 +104,11 @@ class Simulation:
         self._parameters = kernel_parameters(
             scenario, self.effects, self._types, grid=self.grid, limits=self._limits, workers=self._workers
         )
-        initial = material_points(scenario)
-        self.material_points = len(initial.volume)
-        self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
-        self._make_arrays(initial)
+        with memory_for(scenario):
+            initial = material_points(scenario)
+            self.material_points = len(initial.volume)
+            self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
+            self._make_arrays(initial)
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -139,7 +145,7 @@ class Simulation:
         self._target = self._clock[at.TARGET : at.TARGET + 1]
         self._goes_on = self._running[at.GOES_ON : at.GOES_ON + 1]
         self._steps_left = self._running[at.STEPS_LEFT : at.STEPS_LEFT + 1]
-        self._steps_at_once = max(1, FIRST_LOOK_UP // self.material_points)
+        self._steps_at_once = max(1, FIRST_LOOK_UP // max(1, self.material_points))
         # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
         self._seen = {name: array.numpy() for name, array in self._clock_arrays.items()} if device.is_cpu else {}
 
@@ -220,7 +226,7 @@ class Simulation:
 
     def _captured(self, launches: Callable[[], None]) -> Any:
         """A graph of the launches, which replays for a hundredth of what they cost one by one."""
-        wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
+        load_kernels(self.effects.module_name, self.device)
         with wp.ScopedCapture(device=self.device) as capture:
             launches()
         return capture.graph

@@ -160,7 +160,7 @@ def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster
     def slow(scenario):
         simulation = by_value(scenario, fail_at=0.5 if scenario.flow.velocity_m_per_s[0] == 13.0 else None)
         advance = simulation.advance
-        simulation.advance = lambda until: (time.sleep(0.004), advance(until))
+        simulation.advance = lambda until, **stop: (time.sleep(0.004), advance(until, **stop))
         return simulation
 
     plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 13, 14]}}))

@@ -38,7 +38,9 @@ class TimeSeriesRecorder:
             self._file = path.open("r+", encoding="utf-8", newline="")
             header = self._file.readline().rstrip("\n").split(",")
             size = path.stat().st_size
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise RunFolderError(f"{path} cannot be read: {error.strerror or error}.") from None
+        except ValueError as error:
             raise RunFolderError(f"{path} cannot be read: {error}.") from None
         names = {quantity.label: key for key, quantity in TIME_SERIES.items()}
         if size < mark["bytes"] or any(label not in names for label in header):

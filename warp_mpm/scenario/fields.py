@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import unicodedata
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+
+def _whole(value: Any) -> Any:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _text(value: str) -> str:
+    for character in value:
+        if unicodedata.category(character) in ("Cc", "Cs") and character not in "\n\t":
+            kind = "half of a character" if unicodedata.category(character) == "Cs" else "a control character"
+            raise ValueError(f"holds U+{ord(character):04X}, {kind}, where only text is allowed")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+"""A whole number; JSON and evenly spaced values may write it as 3.0."""
+Text = Annotated[str, AfterValidator(_text)]
+"""What a terminal and a file can take as it is."""
 
 # The outer bounds are far beyond any flow; they keep the arithmetic of a typing error finite.
 Positive = Annotated[float, Field(gt=0.0, le=1e15)]

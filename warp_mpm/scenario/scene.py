@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
-from warp_mpm.scenario.fields import Model
+from warp_mpm.scenario.fields import Model, Text
 from warp_mpm.scenario.flow import Flow
 from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output
 from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
@@ -20,11 +20,11 @@ from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
 class Scenario(Model):
     """A whole scene. `Scenario.load(path)` reads one; `Scenario.model_validate(dict)` makes one from Python."""
 
-    title: Annotated[str, Field(min_length=1, max_length=200)]
+    title: Annotated[Text, Field(min_length=1, max_length=200)]
     """One line that names the scene."""
-    source: str = ""
+    source: Text = ""
     """Where the scene's figures come from."""
-    notes: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    notes: Annotated[tuple[Text, ...], Field(strict=False)] = ()
     """Remarks, for instance on a figure of the source that had to be interpreted."""
     gravity: Gravity = Gravity()
     flow: Annotated[Flow, Field(discriminator="formulation")]

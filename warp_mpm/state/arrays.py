@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +18,7 @@ from ..effects import Effects
 from ..grid import GridLayout, contact_nodes, open_corner_volumes
 from ..kernels import layout as at
 from ..scenario import Barrier, Prescribed, Scenario
+from ..scenario.checks import BYTES_PER_POINT
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,26 @@ class Group:
     """The Warp structure that holds them."""
     arrays: dict[str, Any]
     """The same, by name."""
+
+
+@contextmanager
+def memory_for(scenario: Scenario) -> Iterator[None]:
+    """Tell what a scene asks for where its memory cannot be had.
+
+    Raises:
+        MemoryError: with a sentence that names the field that decides.
+    """
+    try:
+        yield
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "allocate" not in str(error):  # Warp's own are RuntimeErrors
+            raise
+        spacing = scenario.numerics.spacing_m
+        points = scenario.flow.volume / spacing**2 * scenario.numerics.points_per_cell
+        raise MemoryError(
+            f"numerics.spacing_m = {spacing:g} asks for {points:.3g} material points and a grid, about "
+            f"{points * BYTES_PER_POINT / 1e9:.2g} GB, more than can be had here"
+        ) from None
 
 
 def point_arrays(
