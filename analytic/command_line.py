@@ -122,8 +122,12 @@ class CommandLine(TyperGroup):
             if not message or message.endswith("?"):
                 return message
             return f"{message}." if where is None else f"{message}; see {where.command_path} --help."
-        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name).rstrip(".")
         problems: list[Any] = getattr(error.__cause__, "errors", list)()
+        said = getattr(error, "message", "")  # of a path; empty where the parameter is missing
+        if said and not problems:
+            unreadable = re.fullmatch(r"\w+ (['\"])(.*)\1 is not readable\.", said)
+            return f"{unreadable[2]} cannot be read: Permission denied." if unreadable else said
+        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name).rstrip(".")
         value = f"= {problems[0]['input']} is not allowed" if problems else "is missing"
         return f"{name} {value}; it must be {self.allowed(parameter)}."
 
