@@ -1,4 +1,4 @@
-"""Command lines whose standard output cannot take everything, or anything: all is computed, and told where it can be."""
+"""Command lines whose standard output cannot take everything, or anything: all is computed all the same."""
 
 import os
 import subprocess

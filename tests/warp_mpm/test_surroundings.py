@@ -182,7 +182,7 @@ def test_memory_that_cannot_be_had(coarse_case_1, monkeypatch, error, tmp_path):
 
 def test_a_link_that_leads_nowhere_is_told(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "gone")
-    with pytest.raises(RunFolderError, match="link is a link to .*gone, which is not there"):
+    with pytest.raises(RunFolderError, match=r"link is a link to .*gone, which is not there"):
         RunFolder.check(tmp_path / "link")
     with pytest.raises(RunFolderError, match="link is no folder"):
         RunFolder.create(tmp_path / "link" / "run", {}, {})
