@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import errno
 import re
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, get_args
@@ -11,6 +11,7 @@ from typing import Annotated, Any, get_args
 import typer
 from typer.core import TyperGroup
 
+from analytic.standard_streams import printable, standard_streams
 from analytic.whole_file import UnwrittenError
 
 BAD_INPUT = 2
@@ -27,13 +28,25 @@ def refusals() -> Iterator[None]:
     except BrokenPipeError:  # the reader of a pipe has seen enough; that is no mistake
         raise
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        raise typer.BadParameter(f"{place}{error.strerror or error}".rstrip(".") + ".") from None
+        raise typer.BadParameter(refused(error)) from None
+
+
+def refused(error: OSError) -> str:
+    """What the system refuses, in one sentence; an error that has a sentence of its own keeps it."""
+    if not error.strerror or isinstance(error, UnwrittenError):
+        return str(error)
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror}".rstrip(".") + "."
 
 
 def complain(sentence: str) -> None:
     """Print a sentence to standard error, red on a terminal."""
-    typer.secho(sentence, err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+    typer.secho(printable(sentence), err=True, fg=typer.colors.RED)
+
+
+def tell(text: str) -> None:
+    """Print to standard output; control characters that came with a title or a file's name are shown as codes."""
+    typer.echo(printable(text))
 
 
 def _tell_versions(asked: bool) -> None:
@@ -65,6 +78,17 @@ class CommandLine(TyperGroup):
         self._typed: dict[str, str] = {}
         for command in self._commands:
             _as_plain_text(command)
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        with standard_streams() as output:
+            try:
+                return super().main(*arguments, **options)
+            except SystemExit as end:
+                if end.code or output.failure is None or getattr(output.failure, "errno", None) == errno.EPIPE:
+                    raise
+                reason = getattr(output.failure, "strerror", None) or output.failure
+                complain(f"Standard output cannot be written: {reason}.")
+                raise SystemExit(BAD_INPUT) from None
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         words = {word.partition("=")[0] for word in args}
@@ -100,6 +124,14 @@ class CommandLine(TyperGroup):
             if sentence:  # else it is a call without arguments, which has printed the help
                 complain(sentence)
             raise typer.Exit(error.exit_code) from None
+        except MemoryError as error:
+            complain(f"There is not enough memory: {error or 'none is left'}".rstrip(".") + ".")
+            raise typer.Exit(BAD_INPUT) from None
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            complain(refused(error))
+            raise typer.Exit(BAD_INPUT) from None
 
     def _sentence(self, error: typer.TyperException) -> str:
         parameter = getattr(error, "param", None)
@@ -110,8 +142,12 @@ class CommandLine(TyperGroup):
             if not message or message.endswith("?"):
                 return message
             return f"{message}." if where is None else f"{message}; see {where.command_path} --help."
-        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name).rstrip(".")
         problems: list[Any] = getattr(error.__cause__, "errors", list)()
+        said = getattr(error, "message", "")  # of a path; empty where the parameter is missing
+        if said and not problems:
+            unreadable = re.fullmatch(r"\w+ (['\"])(.*)\1 is not readable\.", said)
+            return f"{unreadable[2]} cannot be read: Permission denied." if unreadable else said
+        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name).rstrip(".")
         value = f"= {problems[0]['input']} is not allowed" if problems else "is missing"
         return f"{name} {value}; it must be {self.allowed(parameter)}."
 

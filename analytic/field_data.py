@@ -97,13 +97,17 @@ def read_events(path: str | Path) -> Events:
         raise FieldDataError(path, ["holds no event; the first line names the columns, each further line is an event."])
     header = table[0][1]
     delimiter = max(",;\t", key=header.count)
-    columns = _columns(path, [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))])
-    width = header.count(delimiter) + 1
+    names, problem = _cells(*table[0], delimiter)
+    if problem:
+        raise FieldDataError(path, [problem])
+    columns, width = _columns(path, names), len(names)
     problems: list[str] = []
     values: dict[str, list[float]] = {name: [] for name in UNITS}
-    for (number, _), cells in zip(
-        table[1:], csv.reader((line for _, line in table[1:]), delimiter=delimiter), strict=True
-    ):
+    for number, line in table[1:]:
+        cells, problem = _cells(number, line, delimiter)
+        if problem:
+            problems.append(problem)
+            continue
         if len(cells) != width:
             problems.append(f"line {number} has {len(cells)} cells, the header has {width}.")
             continue
@@ -115,6 +119,18 @@ def read_events(path: str | Path) -> Events:
         raise FieldDataError(path, problems)
     arrays = {name: np.array(column) for name, column in values.items()}
     return Events(**arrays, synthetic=any(SYNTHETIC in line for line in comments))
+
+
+def _cells(number: int, line: str, delimiter: str) -> tuple[list[str], str]:
+    """Cells of one line, and what is wrong with it; a quoted cell does not go on in the next line."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=True))], ""
+    except csv.Error as error:
+        if "unexpected end of data" in str(error):
+            return [], f"line {number} opens a quote that is not closed in the line; an event is one line."
+        if "field larger" in str(error):
+            return [], f"line {number} has a cell of more than {csv.field_size_limit():,} characters."
+        return [], f"line {number} cannot be split into cells: {error}."
 
 
 def _columns(path: Path, header: list[str]) -> dict[str, tuple[int, str]]:

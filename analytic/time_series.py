@@ -22,6 +22,9 @@ UNITS = {
 }
 """Columns that this package reads, with the factors from the units they may have to SI."""
 
+LARGEST = 1e15
+"""Value [SI] beyond which a number is a mistake; far below it the square of a number has an end."""
+
 NEEDED = ("time", "impact_force_x")
 
 
@@ -70,9 +73,12 @@ def read_time_series(path: str | Path) -> Series:
         )
     series = {name: table[:, place] * factor for name, (place, factor) in columns.items()}
     for name, values in series.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if bad.size:
-            raise TimeSeriesError(f"{path} line {bad[0] + 2}: {name} is {values[bad[0]]}, it must be a finite number.")
+            raise TimeSeriesError(
+                f"{path} line {bad[0] + 2}: {name} is {values[bad[0]]:g}, it must be a finite number of at most "
+                f"{LARGEST:g} in size."
+            )
     stalled = np.flatnonzero(np.diff(series["time"]) <= 0)
     if stalled.size:
         raise TimeSeriesError(f"{path} line {stalled[0] + 3}: time does not increase.")

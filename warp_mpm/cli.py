@@ -128,7 +128,8 @@ def run(
         scenario = _scenario(scenario_file, spacing, until)
         folder = out if out is not None else Path("runs") / scenario_file.stem
 
-    from warp_mpm.recording.run_folder import RunFolder, RunFolderError
+    from analytic.whole_file import UnwrittenError
+    from warp_mpm.recording.run_folder import CHECKPOINT, RunFolder, RunFolderError
     from warp_mpm.results import ResultsError
     from warp_mpm.run import resume_run, run_scenario
     from warp_mpm.terminal import RunDisplay, StopOnSignal
@@ -176,6 +177,16 @@ def run(
             f"fail again: python -m warp_mpm run --resume {folder}"
         )
         raise typer.Exit(DIVERGED) from None
+    except UnwrittenError as error:
+        _refuse(str(error))
+    except MemoryError as error:
+        if not (folder / CHECKPOINT).exists():
+            raise
+        complain(
+            f"Memory ran out: {error}. What was computed before is kept; to go on where there is more: "
+            f"python -m warp_mpm run --resume {folder}"
+        )
+        raise typer.Exit(BAD_INPUT) from None
     except OSError as error:
         complain(
             f"Cannot write to {folder}: {error.strerror or error}. What was written before is kept; to go on once that "

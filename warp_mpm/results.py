@@ -8,12 +8,14 @@ results.snapshots.at(1.0)["pore_pressure"]     # [points] Pa
 from __future__ import annotations
 
 import json
+import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
+from types import NoneType, TracebackType
 from typing import Any, Self
 
 import h5py
@@ -30,6 +32,23 @@ Array = NDArray[np.float64]
 
 COMPONENTS = {"solid_velocity": 2, "liquid_velocity": 2, "effective_stress": 4}
 """Components of a field in the plane; VTK's others are zero."""
+
+
+RECORD_KINDS: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("status", "title", "scenario_file", "started", "ended", "device", "machine"), (str,)),
+    **dict.fromkeys(("problem", "git_commit"), (str, NoneType)),
+    "git_changed": (bool, NoneType),
+    **dict.fromkeys(("command", "resumed"), (list,)),
+    **dict.fromkeys(("effects", "versions"), (dict,)),
+    **dict.fromkeys(("preparation_time", "simulated_time", "wall_time"), (int, float)),
+    **dict.fromkeys(("time_step_min", "time_step_max"), (int, float, NoneType)),
+    **dict.fromkeys(("material_points", "steps", "points_left", "points_pushed_out", "voids_closed"), (int,)),
+    **dict.fromkeys(("gaps_bounded", "barrier_iterations", "barrier_unconverged"), (int,)),
+    **dict.fromkeys((f"steps_limited_by_{limit}" for limit in ("wave", "drag", "output")), (int,)),
+}
+"""What the entries of a run's record are, as far as anyone reads them."""
+
+_WORDS = {str: "a text", NoneType: "null", bool: "true or false", list: "a list", dict: "a group of fields"}
 
 
 class ResultsError(ValueError):
@@ -69,7 +88,12 @@ class Snapshots:
         try:
             self._file = h5py.File(path, "r", locking=False)
         except OSError as error:
-            reason = "is missing" if not path.exists() else f"cannot be read as HDF5: {error}"
+            if isinstance(error, FileNotFoundError):
+                reason = "is missing"
+            elif error.errno is not None:  # of the system, not of what is in the file
+                reason = f"cannot be read: {os.strerror(error.errno)}"
+            else:
+                reason = f"cannot be read as HDF5: {error}"
             raise ResultsError(f"{path} {reason}.") from None
         try:
             self._root = self._file["VTKHDF"]
@@ -153,9 +177,12 @@ class Results:
             ResultsError: the folder is missing, is no run's, or is of a version whose layout is another.
         """
         folder = Path(path)
-        if not (folder / run_folder.RECORD).is_file():
-            reason = "holds no run (run.json is missing)" if folder.is_dir() else "is no folder"
-            raise ResultsError(f"{folder} {reason}.")
+        try:
+            if not (folder / run_folder.RECORD).is_file():
+                reason = "holds no run (run.json is missing)" if folder.is_dir() else "is no folder"
+                raise ResultsError(f"{folder} {reason}.")
+        except OSError as error:
+            raise ResultsError(f"{folder} cannot be read: {error.strerror or error}.") from None
         results = cls(folder)
         layout = results.record.get("format")
         if layout != run_folder.FORMAT:
@@ -176,8 +203,23 @@ class Results:
 
     @cached_property
     def record(self) -> dict[str, Any]:
-        """Versions, device, status and times of the run."""
-        return self._json(run_folder.RECORD)
+        """Versions, device, status and times of the run.
+
+        Raises:
+            ResultsError: the file is missing or damaged, or an entry is of another kind than a run writes.
+        """
+        record = self._json(run_folder.RECORD)
+        for name, kinds in RECORD_KINDS.items():
+            value = record.get(name)
+            right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
+            if name in record and not (right and (not isinstance(value, float) or math.isfinite(value))):
+                words = [_WORDS[kind] for kind in kinds if kind in _WORDS]
+                words += ["a number" if float in kinds else "a whole number"] if int in kinds else []
+                raise ResultsError(
+                    f"{self.path / run_folder.RECORD} is damaged: {name} = {json.dumps(value)[:80]} must be "
+                    f"{' or '.join(words)}."
+                )
+        return record
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -275,7 +317,9 @@ class Results:
             content = json.loads((self.path / name).read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise ResultsError(f"{self.path / name} is missing.") from None
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise ResultsError(f"{self.path / name} cannot be read: {error.strerror or error}.") from None
+        except (ValueError, RecursionError) as error:
             raise ResultsError(f"{self.path / name} cannot be read: {error}.") from None
         if not isinstance(content, dict):
             raise ResultsError(f"{self.path / name} does not hold a group of fields.")
@@ -305,7 +349,9 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ResultsError(f"{path} is missing.") from None
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise ResultsError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except ValueError as error:
         raise ResultsError(f"{path} cannot be read: {error}.") from None
     lines = text.split("\n")[:-1]  # what follows the last line's end is empty, or a line that was cut off
     if not lines:

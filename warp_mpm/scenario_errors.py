@@ -63,6 +63,8 @@ def read_json(path: Path) -> Any:
         raise ScenarioError(["The file is not UTF-8 text; a scenario is a JSON file."], str(path)) from None
     try:
         return json.loads(text, object_pairs_hook=no_duplicates)
+    except ScenarioError:  # of a field that is given twice
+        raise
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
         raise ScenarioError([f"The file is no valid JSON: {error.msg} at {place}."], str(path)) from None

@@ -21,6 +21,7 @@ from .effect_rules import derive_effects
 from .grid import fit_grid
 from .kernels import layout as at
 from .kernels.build import build_kernels
+from .kernels.cache import initialize_warp, load_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
@@ -28,13 +29,22 @@ from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
-from .state.arrays import clock_arrays, grid_arrays, point_arrays
+from .state.arrays import clock_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
 from .state.samples import OF_THE_LEDGER, BarrierNow, Constants, Window, sample
 from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
+
+LOOK_UP = 0.25
+"""Wall time [s] after which the device hands back to the host, which then hears Ctrl-C; a step is never cut."""
+
+FIRST_LOOK_UP = 100_000
+"""Steps times material points until the first time, when nothing has been timed: some hundredths of a second."""
+
+MOST_STEPS_AT_ONCE = 2**30
+"""Bound of the device's counter."""
 
 
 STATE_OF_BODIES = (
@@ -113,13 +123,16 @@ def _start_warp() -> None:
     what another thread writes at the same time.
     """
     wp.config.log_level = wp.LOG_WARNING
+    if sys.stderr is None:  # a service, or Windows without a console: nothing is shown anyway
+        initialize_warp()
+        return
     sys.stderr.flush()
     stderr = os.dup(2)
     try:
         with tempfile.TemporaryFile() as caught:
             os.dup2(caught.fileno(), 2)
             try:
-                wp.init()
+                initialize_warp()
             finally:
                 os.dup2(stderr, 2)
             caught.seek(0)
@@ -147,6 +160,7 @@ class Simulation:
 
     Raises:
         ValueError: the device does not exist, or the bodies are no scene's: two of one name, flow inside one of them.
+        MemoryError: the device, or this process, may not have what the scene needs.
     """
 
     @_one_thread_at_a_time
@@ -179,11 +193,12 @@ class Simulation:
             limits=self._limits,
             workers=self._workers,
         )
-        initial = material_points(scenario)
-        _check_room(bodies, initial, self.grid.spacing)
-        self.material_points = len(initial.volume)
-        self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
-        self._make_arrays(initial)
+        with memory_for(scenario):
+            initial = material_points(scenario)
+            _check_room(bodies, initial, self.grid.spacing)
+            self.material_points = len(initial.volume)
+            self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
+            self._make_arrays(initial)
         self._arguments: dict[str, Any] = self._clock_arrays | {
             "points": self._points,
             "grid": self._grid,
@@ -225,6 +240,9 @@ class Simulation:
         self._balance = self._clock_arrays["balance"]
         self._sums = self._clock_arrays["sums"]
         self._target = self._clock[at.TARGET : at.TARGET + 1]
+        self._goes_on = self._running[at.GOES_ON : at.GOES_ON + 1]
+        self._steps_left = self._running[at.STEPS_LEFT : at.STEPS_LEFT + 1]
+        self._steps_at_once = max(1, FIRST_LOOK_UP // max(1, self.material_points))
         # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
         self._seen = {}
         if device.is_cpu:
@@ -256,7 +274,7 @@ class Simulation:
 
     def _interval(self) -> None:
         self._start()
-        wp.capture_while(self._running, self._step)
+        wp.capture_while(self._goes_on, self._step)
 
     def _sum_up(self) -> None:
         self._sums.zero_()
@@ -274,7 +292,7 @@ class Simulation:
     @_one_thread_at_a_time
     def _captured(self, launches: Callable[[], None]) -> Any:
         """A graph of the launches, which replays for a hundredth of what they cost one by one."""
-        wp.load_module(wp.get_module(self.effects.module_name), device=self.device)
+        load_kernels(self.effects.module_name, self.device)
         with wp.ScopedCapture(device=self.device) as capture:
             launches()
         return capture.graph
@@ -299,11 +317,18 @@ class Simulation:
         return float(self._grid_arrays["active_count"].numpy()[0]) / self._grid_arrays["block"].size
 
     @_one_thread_at_a_time_on_a_gpu
-    def advance(self, until: float) -> None:
+    def advance(self, until: float, *, stop: Callable[[], bool] = lambda: False) -> None:
         """Run to the time `until` [s], exactly.
 
         Times that differ by less than a thousandth of a nominal step (`time_step.ONE_TIME`) are one time: no step is
         made then, and `time` is `until`. What is left out is made up for by the next step.
+
+        The device hands back about every quarter of a second, between two steps, so that Ctrl-C is heard. That changes
+        no step: whoever goes on to the same time gets the numbers, bit for bit, of a run without a break.
+
+        Args:
+            until: [s].
+            stop: asked whenever the device hands back; true leaves the simulation at the time that it has reached.
 
         Raises:
             ValueError: `until` lies in the past or is not finite.
@@ -315,11 +340,19 @@ class Simulation:
         self._fill(self._target, until)
         if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
             return
-        begin = self.window()
-        wp.capture_launch(self._graph)
-        self._since = begin
-        if int(self._read("counters")[at.DIVERGED]):
-            raise SimulationDiverged(self._what_diverged())
+        since = self.window()
+        while True:
+            before, begin = self.steps, time.perf_counter()
+            self._fill(self._steps_left, self._steps_at_once)
+            wp.capture_launch(self._graph)
+            counters = self._read("counters")  # waits for the device
+            self._since = since
+            if int(counters[at.DIVERGED]):
+                raise SimulationDiverged(self._what_diverged())
+            if int(counters[at.STEPS]) < before + self._steps_at_once or self.time >= until or stop():
+                return
+            rate = self._steps_at_once / (time.perf_counter() - begin)
+            self._steps_at_once = max(1, min(int(rate * LOOK_UP), MOST_STEPS_AT_ONCE))
 
     @_one_thread_at_a_time
     def kernel_times(self, until: float) -> dict[str, float]:
@@ -329,6 +362,7 @@ class Simulation:
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
         self._fill(self._target, until)
+        self._fill(self._steps_left, MOST_STEPS_AT_ONCE)
         self._commands = []
         self._start()
         self._step()
@@ -336,7 +370,7 @@ class Simulation:
         self._commands = None
         start.launch()
         spent = dict.fromkeys((name for name, _ in commands), 0.0)
-        while int(self._read("running")[0]):
+        while int(self._read("running")[at.GOES_ON]):
             for name, command in commands:
                 begin = time.perf_counter()
                 command.launch()

@@ -240,3 +240,11 @@ def test_a_file_that_cannot_be_used_is_explained_in_a_sentence(tmp_path: Path, t
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(TimeSeriesError, match=r"timeseries\.csv cannot be read: No such file"):
         read_time_series(tmp_path)
+
+
+@pytest.mark.parametrize("force", ["1e308", "-1e16", "inf", "nan"])
+def test_a_force_beyond_all_measure_is_named(tmp_path: Path, force: str) -> None:
+    path = tmp_path / "series.csv"
+    path.write_text("time [s],impact_force_x [N/m]\n0,0\n1," + force + "\n2,0\n3,0\n")
+    with pytest.raises(TimeSeriesError, match=r"line 3: impact_force_x is .*, it must be a finite number of at most"):
+        read_time_series(path)

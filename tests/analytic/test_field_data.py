@@ -180,3 +180,30 @@ def test_many_bad_lines_are_counted(tmp_path: Path) -> None:
         read_events(path)
     with pytest.raises(FieldDataError, match="cannot be read"):
         read_events(tmp_path / "none.csv")
+
+
+EVENT = "2000,5.0,0.5,45.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (HEADER + '"2000\n",5,1,45\n' + EVENT, "line 2 opens a quote that is not closed in the line"),
+        (HEADER + EVENT + '"2000,5,1,45\n', "line 3 opens a quote that is not closed in the line"),
+        ('"' + HEADER + EVENT, "line 1 opens a quote that is not closed in the line"),
+        (HEADER + '"2000"x,5,1,45\n', "line 2 cannot be split into cells"),
+        (HEADER + EVENT + "x" * 140_000 + ",5,1,45\n", "line 3 has a cell of more than 131,072 characters"),
+        ("d" * 140_000 + "," + HEADER + EVENT, "line 1 has a cell of more than 131,072 characters"),
+    ],
+)
+def test_lines_that_are_no_cells_are_named_with_the_reason(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text(text)
+    with pytest.raises(FieldDataError, match=re.escape(sentence)):
+        read_events(path)
+
+
+def test_quoted_cells_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text('"place, time",' + HEADER + '"Jiangjia, 1999",' + EVENT)
+    assert read_events(path).speed.tolist() == [5.0]

@@ -35,7 +35,7 @@ class FlyingPoints:
     def prepare(self):
         """There is nothing to compile."""
 
-    def advance(self, until):
+    def advance(self, until, **stop):
         if self._fail_at is not None and until > self._fail_at:
             raise ArithmeticError("the run has diverged")
         self.steps += 1

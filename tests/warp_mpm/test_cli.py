@@ -136,10 +136,10 @@ def test_unknown_device(command, monkeypatch):
 
 def test_divergence_keeps_what_was_computed(command, monkeypatch, flying_points):
     class Diverging(flying_points):
-        def advance(self, until):
+        def advance(self, until, **stop):
             if until > 0.5:
                 raise warp_mpm.simulation.SimulationDiverged("The run diverged at t = 0.5 s.")
-            super().advance(until)
+            super().advance(until, **stop)
 
     monkeypatch.setattr(warp_mpm.simulation, "Simulation", Diverging)
     result = run(command, "--out", "here")
@@ -155,8 +155,8 @@ def test_divergence_keeps_what_was_computed(command, monkeypatch, flying_points)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flying_points, number):
     class Interrupted(flying_points):
-        def advance(self, until):
-            super().advance(until)
+        def advance(self, until, **stop):
+            super().advance(until, **stop)
             if until == pytest.approx(0.5):
                 os.kill(os.getpid(), number)
 
@@ -176,8 +176,8 @@ def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flyi
 
 def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
     class Interrupted(flying_points):
-        def advance(self, until):
-            super().advance(until)
+        def advance(self, until, **stop):
+            super().advance(until, **stop)
             if until == pytest.approx(0.52):  # between two snapshots
                 os.kill(os.getpid(), signal.SIGINT)
 

@@ -195,3 +195,27 @@ def test_names_in_a_scenario_lead_nowhere(tmp_path, coarse_case_1, flying_points
     run_scenario(scenario, tmp_path / "run", make_simulation=flying_points)
     evaluate(tmp_path / "run")
     assert [item.name for item in tmp_path.iterdir()] == ["run"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("resumed", 7, "resumed = 7 must be a list"),
+        ("resumed", None, "resumed = null must be a list"),
+        ("status", 1, "status = 1 must be a text"),
+        ("problem", [], r"problem = \[\] must be a text or null"),
+        ("versions", [1], r"versions = \[1\] must be a group of fields"),
+        ("wall_time", "1", 'wall_time = "1" must be a number'),
+        ("steps", True, "steps = true must be a whole number"),
+        ("time_step_min", float("nan"), "time_step_min = NaN must be null or a number"),
+    ],
+)
+def test_a_record_of_the_wrong_kind_is_one_sentence(tmp_path, stopped, name, value, words):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for other, content in stopped.items():
+        (folder / other).write_bytes(content)
+    record = json.loads((folder / run_folder.RECORD).read_text())
+    (folder / run_folder.RECORD).write_text(json.dumps(record | {name: value}))
+    with pytest.raises(ResultsError, match=rf"run.json is damaged: {words}\.$"):
+        resume_run(folder, make_simulation=unmade)

@@ -26,7 +26,7 @@ class Clock:
     def __init__(self):
         self.time, self.barrier_displacement, self.visited = 0.0, 0.0, [0.0]
 
-    def advance(self, until):
+    def advance(self, until, **stop):
         assert until > self.time
         self.time = until
         self.barrier_displacement = 0.25 * until

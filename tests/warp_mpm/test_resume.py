@@ -116,9 +116,9 @@ def test_kernels_are_compiled_before_the_clock_starts(tmp_path, coarse_case_1, f
         def prepare(self):
             calls.append("prepare")
 
-        def advance(self, until):
+        def advance(self, until, **stop):
             calls.append("advance")
-            super().advance(until)
+            super().advance(until, **stop)
 
     run_scenario(coarse_case_1, tmp_path / "run", make_simulation=Told, stop=lambda: len(calls) > 3)
     assert calls.count("prepare") == 1
@@ -238,7 +238,7 @@ def test_a_checkpoint_that_fits_no_longer(stopped, coarse_case_1):
 
 def test_a_second_run_is_kept_out_of_a_folder_in_use(stopped, coarse_case_1, flying_points):
     class Meddled(flying_points):
-        def advance(self, until):
+        def advance(self, until, **stop):
             if until > 2.0:
                 for meddle in (
                     lambda: resume_run(stopped, make_simulation=flying_points),
@@ -246,7 +246,7 @@ def test_a_second_run_is_kept_out_of_a_folder_in_use(stopped, coarse_case_1, fly
                 ):
                     with pytest.raises(RunFolderError, match="Another run is writing to"):
                         meddle()
-            super().advance(until)
+            super().advance(until, **stop)
 
     assert resume_run(stopped, make_simulation=Meddled).finished
 

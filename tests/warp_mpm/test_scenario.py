@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from warp_mpm.scenario import Fixed, Scenario, Trapezoid, json_schema
 from warp_mpm.scenario_errors import ScenarioError
+from warp_mpm.time_step import step_limits
 
 SCENES = Path(__file__).parents[2] / "scenarios"
 NAMES = sorted(path.stem for path in SCENES.glob("*.json"))
@@ -389,3 +390,49 @@ def test_whatever_a_file_holds_it_is_a_scene_or_one_clear_error(name, changes):
 def test_scenario_cannot_be_changed(case_1):
     with pytest.raises(ValueError, match="frozen"):
         case_1.title = "other"
+
+
+def test_a_field_that_is_given_twice(tmp_path):
+    path = tmp_path / "scene.json"
+    path.write_text('{"title": "one", "title": "two"}')
+    with pytest.raises(ScenarioError) as refused:
+        Scenario.load(path)
+    assert refused.value.problems == ["The field 'title' is given twice in one group."]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("title", "a\x1b[31mred", "title: holds U+001B, a control character, where only text is allowed."),
+        ("source", "a\x9b", "source: holds U+009B, a control character, where only text is allowed."),
+        ("notes", ["", "\udfff"], "notes[1]: holds U+DFFF, half of a character, where only text is allowed."),
+    ],
+)
+def test_text_that_no_file_or_terminal_takes(case_1, field, value, sentence):
+    with pytest.raises(ScenarioError) as refused:
+        case_1.replaced({field: value})
+    assert refused.value.problems == [sentence]
+
+
+def test_whole_numbers_may_be_written_with_a_point(case_1):
+    assert case_1.replaced({"flow.shape.squares": 3.0}).flow.shape.squares == 3
+    with pytest.raises(ScenarioError, match=r"squares = 2.5 is not allowed; it must be a whole number at least 0"):
+        case_1.replaced({"flow.shape.squares": 2.5})
+
+
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        [[-5, 0], [-5 + 1e-12, 0], [-5 + 1e-12, 2], [-5, 2]],
+        [[-5, 0], [-3, 0], [-4, 1e-13]],
+        [[-5, 0], [-4, 1], [-4, 1 + 1e-13], [-5, 1e-13]],
+    ],
+)
+def test_an_outline_too_thin_to_have_an_inside(case_1, vertices):
+    with pytest.raises(ScenarioError, match=r"^flow.shape: vertices_m (enclose|must)"):
+        case_1.replaced({"flow.shape": {"kind": "polygon", "vertices_m": vertices}, "numerics.spacing_m": 1e-6})
+
+
+def test_a_phase_without_weight(case_1):
+    with pytest.raises(ValueError, match=r"flow.material: sound would run through it at .* m/s; porosity, densities"):
+        step_limits(case_1.replaced({"flow.material.porosity": 5e-324}))

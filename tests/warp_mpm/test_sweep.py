@@ -50,6 +50,25 @@ def test_grid_and_list(load):
     assert [tuple(case.values()) for case in listed.values()] == [(1600, 10), (2000, 20)]
 
 
+def test_whole_numbers(load):
+    squares = "flow.shape.squares"
+    cases = load(sweep_of("grid", {squares: {"range": [1, 3, 3]}})).cases(Scenario.load(SET_IIB))
+    assert [case.scenario.flow.shape.squares for case in cases] == [1, 2, 3]
+    assert [case.values[squares] for case in cases] == [1, 2, 3]
+    assert all(type(case.values[squares]) is int for case in cases)
+    assert load(sweep_of("grid", {squares: {"values": [2.0, 4]}})).cases(Scenario.load(SET_IIB))[0].values[squares] == 2
+    for between in ({"range": [1, 2, 3]}, {"values": [1, 1.5]}):
+        with pytest.raises(SweepError, match=rf"^Case 1 .*: {squares} = 1.5 is not allowed; it must be a whole number"):
+            load(sweep_of("grid", {squares: between})).cases(Scenario.load(SET_IIB))
+    with pytest.raises(SweepError, match="must be a whole number"):
+        load(sweep_of("random", {SPEED: {"uniform": [1, 2]}}, samples=2.5))
+
+
+def test_a_title_that_would_command_a_terminal(load):
+    with pytest.raises(SweepError, match=r"title: holds U\+001B, a control character"):
+        load(sweep_of("grid", {SPEED: {"values": [1]}}) | {"title": "\x1b[31mred"})
+
+
 def test_latin_hypercube_has_one_sample_in_each_stratum(load):
     count = 50
     plan = load(sweep_of("latin_hypercube", {SPEED: {"uniform": [5, 25]}, MASS: {"uniform": [0, 1]}}, samples=count))
@@ -160,7 +179,7 @@ def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster
     def slow(scenario):
         simulation = by_value(scenario, fail_at=0.5 if scenario.flow.velocity_m_per_s[0] == 13.0 else None)
         advance = simulation.advance
-        simulation.advance = lambda until: (time.sleep(0.004), advance(until))
+        simulation.advance = lambda until, **stop: (time.sleep(0.004), advance(until, **stop))
         return simulation
 
     plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 13, 14]}}))

@@ -10,6 +10,7 @@ from .layout import (
     ACTIVE_MASS_SOLID,
     DIVERGED,
     FASTEST,
+    GOES_ON,
     GRAVITY_IMPULSE_X,
     GRAVITY_IMPULSE_Y,
     INITIAL_MASS_LIQUID,
@@ -25,6 +26,7 @@ from .layout import (
     SMALLEST_TIME_STEP,
     SPEED_MAX,
     STEPS,
+    STEPS_LEFT,
     TARGET,
     TIME,
     TIME_STEP,
@@ -117,7 +119,7 @@ def make_clock(types: SimpleNamespace, bodies_of: Any, module: str) -> SimpleNam
                 drive(bodies, grid, parameters, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
             go = wp.int32(1)
-        running[0] = go
+        running[wp.static(GOES_ON)] = go
 
     @wp.kernel(module=module)
     def tick(
@@ -171,11 +173,15 @@ def make_clock(types: SimpleNamespace, bodies_of: Any, module: str) -> SimpleNam
             counters[wp.static(DIVERGED)] = 1
         if counters[wp.static(DIVERGED)] != 0:
             go = wp.int32(0)
+        # After its share of steps the device lets the host look up. `start` then chooses the next step as is done here.
+        running[wp.static(STEPS_LEFT)] = running[wp.static(STEPS_LEFT)] - 1
+        if running[wp.static(STEPS_LEFT)] <= 0:
+            go = wp.int32(0)
         if go == 1:
             choose_step(parameters, clock, counters)
             if DRIVEN:
                 drive(bodies, grid, parameters, clock)
             clock[wp.static(SPEED_MAX)] = wp.float64(0.0)
-        running[0] = go
+        running[wp.static(GOES_ON)] = go
 
     return SimpleNamespace(start=start, tick=tick)

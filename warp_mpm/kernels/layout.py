@@ -69,6 +69,12 @@ POINTS_PUSHED = 8
 LIMIT_LAW = 9
 COUNTERS_SIZE = 10
 
+# Whether the loop over steps goes on, an int32 array; no part of the state.
+GOES_ON = 0
+STEPS_LEFT = 1
+"""Steps that the device may make before the host looks up; the host says how many."""
+RUNNING_SIZE = 2
+
 # Ledger sums, a float64 array written by the ledger kernel.
 LEDGER_KINETIC = 0
 LEDGER_GRAVITATIONAL = 1

@@ -91,11 +91,21 @@ class RunFolder:
             RunFolderError: it holds a run and `force` is not set, it holds something else, or it is a file.
         """
         path = Path(path)
-        if not path.exists():
-            return
-        if not path.is_dir():
-            raise RunFolderError(f"{path} is a file; the results need a folder. Choose another with --out.")
-        names = {item.name for item in path.iterdir()}
+        try:
+            if path.is_symlink() and not path.exists():
+                raise RunFolderError(
+                    f"{path} is a link to {os.readlink(path)}, which is not there; choose another folder with --out."
+                )
+            if not path.exists():
+                return
+            if not path.is_dir():
+                raise RunFolderError(f"{path} is a file; the results need a folder. Choose another with --out.")
+            names = {item.name for item in path.iterdir()}
+        except RunFolderError:
+            raise
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise RunFolderError(f"{path} cannot be used: {reason}; choose another folder with --out.") from None
         if not names:
             return
         if RECORD not in names:
@@ -122,7 +132,10 @@ class RunFolder:
         folder = cls(path)
         path = folder.path
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            try:
+                path.mkdir(parents=True, exist_ok=True)
+            except FileExistsError as error:  # a file, or a link that leads nowhere, in the place of a folder
+                raise RunFolderError(f"Cannot write to {path}: {error.filename} is no folder.") from None
             folder.lock()
             if force:
                 # The record goes last: as long as it is there, the folder is known as a run's.
@@ -131,8 +144,8 @@ class RunFolder:
                     (path / (name + ASIDE)).unlink(missing_ok=True)
                     (path / name).unlink(missing_ok=True)
             # Of two runs that start at once into one folder, only one can create the record.
-            with (path / RECORD).open("x", encoding="utf-8") as file:
-                file.write(_text(record))
+            with (path / RECORD).open("xb") as file:
+                file.write(_bytes(record))
             folder.write(SCENARIO, scenario)
         except FileExistsError:
             folder.release()
@@ -146,7 +159,7 @@ class RunFolder:
 
     def write(self, name: str, content: dict[str, Any]) -> None:
         """Write a JSON file whole or not at all. A number that is none (NaN) or has no end is written as null."""
-        self.write_bytes(name, _text(content).encode())
+        self.write_bytes(name, _bytes(content))
 
     def write_bytes(self, name: str, *content: bytes) -> None:
         """Write a file, given in pieces, whole or not at all.
@@ -177,5 +190,6 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _text(content: dict[str, Any]) -> str:
-    return json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+def _bytes(content: dict[str, Any]) -> bytes:
+    text = json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return text.encode(errors="backslashreplace")  # half a character, of a file's name, becomes what JSON calls it

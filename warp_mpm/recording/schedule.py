@@ -24,8 +24,8 @@ class Simulated(Protocol):
     def nominal_step(self) -> float:
         """The step [s] against which times are told apart."""
 
-    def advance(self, until: float) -> Any:
-        """Step to exactly `until` [s]."""
+    def advance(self, until: float, *, stop: Callable[[], bool]) -> Any:
+        """Step to exactly `until` [s]; `stop` is asked now and then, and true ends the stretch early."""
 
     def window(self) -> Any:
         """A mark of the present time."""
@@ -97,7 +97,7 @@ def record_until(
         recorders: each is called with the simulation.
         end_time: [s].
         on_step: called after each stretch between records, for instance to show progress.
-        stop: asked after each stretch; true ends the run early, with a last record.
+        stop: asked after each stretch, and by the simulation within it; true ends the run early, with a last record.
         after_records: called with the simulation and `stopping`, before the end, when the records that are due have
             been made and before those that only a stop calls for: a run that goes on from there knows of no stop.
 
@@ -117,7 +117,7 @@ def record_until(
         after_records(simulation, stopping=False)
     while not ended:
         until = min([end_time, *(recorder.schedule.next_time for recorder in recorders)])
-        simulation.advance(end_time if end_time - until <= slack else until)
+        simulation.advance(end_time if end_time - until <= slack else until, stop=stop)
         late = []
         for recorder in recorders:
             if recorder.schedule.due(simulation.time, slack):

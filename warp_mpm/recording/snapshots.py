@@ -97,6 +97,8 @@ class SnapshotRecorder:
             if self._file is not None:
                 self._file.close()
                 self._file = None
+            if isinstance(error, OSError) and error.errno is not None:  # of the system, not of what is in the file
+                raise RunFolderError(f"{self._path} cannot be read: {os.strerror(error.errno)}.") from None
             raise RunFolderError(f"{self._path} is damaged: {error}.") from None
 
     def _set_constants(self) -> None:

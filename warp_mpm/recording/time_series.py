@@ -67,7 +67,9 @@ class TimeSeriesRecorder:
             self._file = path.open("r+", encoding="utf-8", newline="")
             header = self._file.readline().rstrip("\n").split(",")
             size = path.stat().st_size
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise RunFolderError(f"{path} cannot be read: {error.strerror or error}.") from None
+        except ValueError as error:
             raise RunFolderError(f"{path} cannot be read: {error}.") from None
         names = {label: key_of(label) for label in header}
         if size < mark["bytes"] or None in names.values():

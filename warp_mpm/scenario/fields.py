@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from warp_mpm.scenario_errors import ScenarioError, sentences
+
+
+def _whole(value: Any) -> Any:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _text(value: str) -> str:
+    for character in value:
+        if unicodedata.category(character) in ("Cc", "Cs") and character not in "\n\t":
+            kind = "half of a character" if unicodedata.category(character) == "Cs" else "a control character"
+            raise ValueError(f"holds U+{ord(character):04X}, {kind}, where only text is allowed")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+"""A whole number; JSON and evenly spaced values may write it as 3.0."""
+Text = Annotated[str, AfterValidator(_text)]
+"""What a terminal and a file can take as it is."""
 
 # The outer bounds are far beyond any flow; they keep the arithmetic of a typing error finite.
 Positive = Annotated[float, Field(gt=0.0, le=1e15)]

@@ -13,9 +13,15 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity, Whole, set_fields
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
+
+NARROWEST = 1e-6
+"""Least width and height [m] of a flow's outline, those of the finest grid's cell."""
+
+THINNEST = 1e-12
+"""Least area of a flow's outline over the square of its extent; below it rounding decides where inside is."""
 
 
 class FrontAndTail(Model):
@@ -24,7 +30,7 @@ class FrontAndTail(Model):
     kind: Literal["front_and_tail"]
     depth_m: Length
     """Flow depth h."""
-    squares: Annotated[int, Field(ge=0, le=100_000)]
+    squares: Annotated[Whole, Field(ge=0, le=100_000)]
     """Number i of squares between front and tail. Volume (2 + i) h² per metre of width."""
     distance_m: Annotated[float, Field(ge=0.0, le=1e6)]
     """Distance d from the front's toe to the barrier's toe."""
@@ -53,6 +59,14 @@ class FlowPolygon(Model):
             )
         if not geometry.area(self.polygon) > 0.0:
             raise ValueError("vertices_m must enclose an area greater than 0")
+        width, height = np.ptp(self.polygon, axis=0)
+        share = geometry.area(self.polygon) / (width**2 + height**2)
+        if min(width, height) < NARROWEST or share < THINNEST:
+            raise ValueError(
+                f"vertices_m enclose {geometry.area(self.polygon):.3g} m² in a box of {width:.3g} m by {height:.3g} m; "
+                f"the box must be at least {NARROWEST:g} m wide and high, and the area at least {THINNEST:g} of its "
+                "diagonal squared"
+            )
         return self
 
     @property

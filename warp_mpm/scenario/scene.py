@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
-from warp_mpm.scenario.fields import Model, set_fields
+from warp_mpm.scenario.fields import Model, Text, set_fields
 from warp_mpm.scenario.flow import Flow, offer_laws
 from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
 from warp_mpm.scenario_errors import ScenarioError, read_json
@@ -23,11 +23,11 @@ class Scenario(Model):
     They and the constructor raise one error, ScenarioError.
     """
 
-    title: Annotated[str, Field(min_length=1, max_length=200)]
+    title: Annotated[Text, Field(min_length=1, max_length=200)]
     """One line that names the scene."""
-    source: str = ""
+    source: Text = ""
     """Where the scene's figures come from."""
-    notes: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    notes: Annotated[tuple[Text, ...], Field(strict=False)] = ()
     """Remarks, for instance on a figure of the source that had to be interpreted."""
     gravity: Gravity = Gravity()
     flow: Annotated[Flow, Field(discriminator="formulation")]

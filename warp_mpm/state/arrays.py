@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,9 +16,30 @@ from ..effects import Effects
 from ..grid import GridLayout
 from ..kernels import layout as at
 from ..scenario import Scenario
+from ..scenario.checks import BYTES_PER_POINT
 from ..simulator.bodies import Body
 from ..simulator.bodies.arrays import Group, filled
 from ..simulator.bodies.room import open_corner_volumes, solid_cells
+
+
+@contextmanager
+def memory_for(scenario: Scenario) -> Iterator[None]:
+    """Tell what a scene asks for where its memory cannot be had.
+
+    Raises:
+        MemoryError: with a sentence that names the field that decides.
+    """
+    try:
+        yield
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "allocate" not in str(error):  # Warp's own are RuntimeErrors
+            raise
+        spacing = scenario.numerics.spacing_m
+        points = scenario.flow.volume / spacing**2 * scenario.numerics.points_per_cell
+        raise MemoryError(
+            f"numerics.spacing_m = {spacing:g} asks for {points:.3g} material points and a grid, about "
+            f"{points * BYTES_PER_POINT / 1e9:.2g} GB, more than can be had here"
+        ) from None
 
 
 def point_arrays(
@@ -83,7 +105,7 @@ def clock_arrays(
     return {
         "clock": wp.array(clock, dtype=wp.float64, device=device),
         "counters": wp.zeros(at.COUNTERS_SIZE, dtype=wp.int32, device=device),
-        "running": wp.zeros(1, dtype=wp.int32, device=device),
+        "running": wp.zeros(at.RUNNING_SIZE, dtype=wp.int32, device=device),
         "balance": wp.array(balance, dtype=wp.float64, device=device),
         "limiters": wp.zeros(at.LIMITERS_SIZE, dtype=wp.float64, device=device),
         "reactions": wp.zeros(2 * surfaces, dtype=wp.float64, device=device),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from warp_mpm.scenario import Scenario
+from warp_mpm.scenario.fields import Text, Whole
 from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
 
 MOST_CASES = 100_000
@@ -123,7 +124,7 @@ class Case:
 class Sweep(_Model):
     """The content of a sweep file. `Sweep.load(path)` reads one."""
 
-    title: Annotated[str, Field(min_length=1, max_length=200)]
+    title: Annotated[Text, Field(min_length=1, max_length=200)]
     """One line that names the sweep."""
     scenario: str
     """Scenario file, seen from the folder of the sweep file."""
@@ -134,9 +135,9 @@ class Sweep(_Model):
     and random: samples of distributions."""
     vary: Annotated[dict[str, Variation], Field(min_length=1)]
     """Fields that vary, by their paths; a number at the end of a path picks from a list, `flow.velocity_m_per_s.0`."""
-    samples: Annotated[int, Field(ge=1, le=MOST_CASES)] | None = None
+    samples: Annotated[Whole, Field(ge=1, le=MOST_CASES)] | None = None
     """Number of cases of latin_hypercube and random."""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[Whole, Field(ge=0)] = 0
     """Start of the random numbers: the same seed, the same cases."""
 
     @classmethod
@@ -202,8 +203,16 @@ class Sweep(_Model):
             except ScenarioError as error:
                 told = ", ".join(f"{path} = {json.dumps(value)}" for path, value in values.items())
                 raise SweepError(f"Case {number} ({told}): {error}") from None
-            cases.append(Case(number, values, scenario))
+            cases.append(Case(number, {path: _as_taken(scenario, path, values[path]) for path in values}, scenario))
         return cases
+
+
+def _as_taken(scenario: Scenario, path: str, value: Any) -> Any:
+    """The value, as a whole number where the field takes only those."""
+    taken: Any = scenario
+    for name in path.split("."):
+        taken = taken[int(name)] if isinstance(taken, tuple) else getattr(taken, name)
+    return taken if isinstance(taken, int) and not isinstance(value, bool) else value
 
 
 def changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:

@@ -163,7 +163,11 @@ def _claim(out: Path, content: dict[str, Any]) -> None:
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise SweepError(f"{out} holds something that is no sweep; choose another folder with --out.")
-    (out / CASES).mkdir(parents=True, exist_ok=True)
+    try:
+        (out / CASES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = f"a link to {out.readlink()}, which is not there" if out.is_symlink() else error.strerror
+        raise SweepError(f"{out} cannot be made: {reason}; choose another folder with --out.") from None
     RunFolder(out).write(SWEEP, content)
 
 
