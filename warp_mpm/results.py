@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.extras import missing
+from warp_mpm.quantities import POINT_FIELDS, TIME_SERIES, time_series_quantity
 from warp_mpm.recording import run_folder
-from warp_mpm.recording.quantities import POINT_FIELDS, TIME_SERIES, time_series_quantity
 from warp_mpm.recording.time_series import key_of
 from warp_mpm.scenario import Scenario
 

@@ -28,7 +28,7 @@ from warp_mpm.recording import (
     run_folder,
 )
 from warp_mpm.recording.checkpoint import Checkpoint, versions
-from warp_mpm.recording.quantities import recorded_quantities
+from warp_mpm.recording.chosen import recorded_quantities
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.surfaces import write_surfaces
 from warp_mpm.results import Results, ResultsError

@@ -10,9 +10,9 @@ From then on scenarios take it by its name (`numerics.transfer`), and `numerics`
 
 from __future__ import annotations
 
-from warp_mpm.scenario.fields import Model
 from warp_mpm.scenario.scene import offer_anew
 from warp_mpm.scenario.settings import Numerics
+from warp_mpm.schema import Model
 from warp_mpm.simulator.point_field import PointField
 from warp_mpm.simulator.schemes import SCHEMES, Scheme
 from warp_mpm.simulator.schemes.apic import Apic

@@ -22,7 +22,7 @@ from analytic.force_record import (
     still_rises,
 )
 from warp_mpm import mechanism
-from warp_mpm.recording.quantities import left_out
+from warp_mpm.recording.chosen import left_out
 from warp_mpm.results import ResultsError, Snapshots
 from warp_mpm.scenario import Scenario, Sliding
 

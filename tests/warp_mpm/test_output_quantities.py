@@ -7,7 +7,8 @@ import pytest
 
 from warp_mpm.caveats import run_caveats
 from warp_mpm.plotting import comparison, force_and_displacement
-from warp_mpm.recording.quantities import TIME_SERIES, quantities_of, recorded_quantities
+from warp_mpm.quantities import TIME_SERIES
+from warp_mpm.recording.chosen import quantities_of, recorded_quantities
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.run import resume_run, run_scenario
 from warp_mpm.scenario_errors import ScenarioError

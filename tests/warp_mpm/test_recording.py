@@ -11,8 +11,8 @@ import pytest
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
+from warp_mpm.quantities import TIME_SERIES
 from warp_mpm.recording import RunFolder, Schedule, SnapshotRecorder, TimeSeriesRecorder, record_until, run_folder
-from warp_mpm.recording.quantities import TIME_SERIES
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.results import ResultsError, Snapshots, read_time_series
 from warp_mpm.state.samples import Window

@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from warp_mpm.recording.quantities import POINT_FIELDS, check_known
+from warp_mpm.quantities import POINT_FIELDS, check_known
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 

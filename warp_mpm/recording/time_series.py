@@ -8,7 +8,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
-from warp_mpm.recording.quantities import TIME_SERIES, check_known, time_series_quantity
+from warp_mpm.quantities import TIME_SERIES, check_known, time_series_quantity
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 from warp_mpm.state.samples import Window

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.scenario.fields import Density, Friction, Length, Model, Positive, Series, Velocity
+from warp_mpm.schema import Density, Friction, Length, Model, Positive, Series, Velocity
 
 BASE_STRENGTH_RATIO = 0.8
 """Share of the base soil's tan φ that resists sliding at the barrier's base (paper, §2.2)."""

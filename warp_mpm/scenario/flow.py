@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity, Whole, set_fields
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
+from warp_mpm.schema import Density, Length, Model, NonNegative, Point, Positive, Velocity, Whole, set_fields
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6

@@ -11,10 +11,10 @@ from pydantic import Field, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
-from warp_mpm.scenario.fields import Model, Text, set_fields
 from warp_mpm.scenario.flow import Flow, offer_laws
 from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
 from warp_mpm.scenario_errors import ScenarioError, read_json
+from warp_mpm.schema import Model, Text, set_fields
 
 
 class Scenario(Model):

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from warp_mpm.scenario.fields import Coordinate, Friction, Interval, Model, NonNegative, set_fields
+from warp_mpm.quantities import TIME_SERIES
+from warp_mpm.schema import Coordinate, Friction, Interval, Model, NonNegative, set_fields
 from warp_mpm.simulator.schemes import SCHEMES
 
 STANDARD_GRAVITY = 9.81
@@ -114,8 +115,6 @@ class Output(Model):
     @classmethod
     def _known(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if names is not None:
-            from warp_mpm.recording.quantities import TIME_SERIES  # the recorders need the scenario's own models
-
             known = [quantity.name for quantity in TIME_SERIES.values()]
             for name in names:
                 if name not in known:

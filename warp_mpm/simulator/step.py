@@ -3,28 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 from ..effects import Effects
 from .bodies import Body, Sliding
 from .bodies.arrays import passes
-
-
-@dataclass(frozen=True)
-class Launch:
-    """One launch of a kernel."""
-
-    kernel: str
-    over: Literal["one", "workers", "points", "places", "groups"]
-    """What its threads count: workers share the blocks of the grid in use; places and groups are a body's."""
-    takes: tuple[str, ...]
-    """Its arguments, by the names under which the simulation knows them."""
-    does: str
-    """What it does, in a clause."""
-    of: str = ""
-    """The body that it acts for."""
-
+from .launch import Launch
 
 START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies", "grid"), "begins an interval")
 LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "sums"), "sums over the points, for a sample")

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from warp_mpm.scenario import Scenario
-from warp_mpm.scenario.fields import Text, Whole
 from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
+from warp_mpm.schema import Text, Whole
 
 MOST_CASES = 100_000
 """Most cases of a sweep; more is a typing error."""

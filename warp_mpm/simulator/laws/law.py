@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.scenario.fields import Model
+from warp_mpm.schema import Model
 
 from ..point_field import PointField
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from warp_mpm.scenario.fields import Model, NonNegative
+from warp_mpm.schema import Model, NonNegative
 
 from .law import Array, Law
 

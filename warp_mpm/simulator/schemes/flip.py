@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from warp_mpm.scenario.fields import Model
+from warp_mpm.schema import Model
 
 from ..point_field import PointField
 from .scheme import Scheme

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-from warp_mpm.scenario.fields import Model
+from warp_mpm.schema import Model
 
+from ..launch import Launch
 from ..point_field import PointField
-
-if TYPE_CHECKING:
-    from ..step import Launch
 
 
 class Scheme:
@@ -77,7 +75,7 @@ class Scheme:
         """Kernels of its own, by name."""
         return {}
 
-    def launches(self) -> "tuple[tuple[str, Launch], ...]":
+    def launches(self) -> tuple[tuple[str, Launch], ...]:
         """Launches of these, each with the name of the kernel after which it comes."""
         return ()
 

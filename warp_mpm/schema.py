@@ -1,4 +1,4 @@
-"""Types of a scenario's fields, with their outer bounds."""
+"""Types of the fields in scenario files, with their outer bounds: what every part of a scenario is made of."""
 
 from __future__ import annotations
 
