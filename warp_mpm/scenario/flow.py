@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.scenario.fields import Density, Length, Model, NonNegative, Point, Positive, Velocity, Whole
+from warp_mpm.scenario.fields import AsWhole, Density, Length, Model, NonNegative, Point, Positive, Velocity
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
 
 NARROWEST = 1e-6
@@ -27,7 +27,7 @@ class FrontAndTail(Model):
     kind: Literal["front_and_tail"]
     depth_m: Length
     """Flow depth h."""
-    squares: Annotated[Whole, Field(ge=0, le=100_000)]
+    squares: Annotated[int, Field(ge=0, le=100_000), AsWhole]
     """Number i of squares between front and tail. Volume (2 + i) h² per metre of width."""
     distance_m: Annotated[float, Field(ge=0.0, le=1e6)]
     """Distance d from the front's toe to the barrier's toe."""
