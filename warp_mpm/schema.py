@@ -25,8 +25,8 @@ def _text(value: str) -> str:
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_whole)]
-"""A whole number; JSON and evenly spaced values may write it as 3.0."""
+AsWhole = BeforeValidator(_whole)
+"""Of a whole number, after its bounds: JSON and evenly spaced values may write it as 3.0."""
 Text = Annotated[str, AfterValidator(_text)]
 """What a terminal and a file can take as it is."""
 

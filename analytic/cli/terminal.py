@@ -10,6 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
+from analytic.command_line import tell
+
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, SI units per metre of width.")]
 Plot = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a png, pdf or svg file.")
@@ -46,7 +48,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 
     align = [False, *numeric]
     lines = ["", title, "", line(header), "─" * (sum(widths) + 2 * (len(widths) - 1)), *map(line, rows), ""]
-    typer.echo("\n".join([*lines, *notes]))
+    tell("\n".join([*lines, *notes]))
 
 
 def number(value: float | None, digits: int = 4) -> str:

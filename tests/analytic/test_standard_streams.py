@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
+from analytic.cli.terminal import print_table
 from analytic.standard_streams import Outlet, printable, spelled
 
 ROOT = Path(__file__).parents[2]
@@ -86,5 +88,10 @@ def test_spelling():
     assert spelled("\ud800") == spelled("漢") == "?"
 
 
-def test_control_characters_are_shown_as_codes():
+def test_control_characters_are_shown_as_codes(monkeypatch):
+    sent = []
+    monkeypatch.setattr(typer, "echo", sent.append)
+    print_table("a\x1b[31mred", ["name", "value"], [["b\x9b", "1"]], ["c\x07"])
+    assert "a\\x1b[31mred" in sent[0]
+    assert not {"\x1b", "\x9b", "\x07"} & set(sent[0])
     assert printable("a\x1b[31m\x9b\ud800\nλ") == "a\\x1b[31m\\x9b\\ud800\nλ"

@@ -418,6 +418,8 @@ def test_whole_numbers_may_be_written_with_a_point(case_1):
     assert case_1.replaced({"flow.shape.squares": 3.0}).flow.shape.squares == 3
     with pytest.raises(ScenarioError, match=r"squares = 2.5 is not allowed; it must be a whole number at least 0"):
         case_1.replaced({"flow.shape.squares": 2.5})
+    squares = json.loads(json_schema())["$defs"]["FrontAndTail"]["properties"]["squares"]
+    assert (squares["type"], squares["minimum"], squares["maximum"]) == ("integer", 0, 100_000)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analytic.command_line import BAD_INPUT, complain
+from analytic.command_line import BAD_INPUT, complain, tell
 
 
 def check(
@@ -24,9 +24,7 @@ def check(
         try:
             scenario = Scenario.load(file)
             notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
-            typer.echo(
-                "\n  ".join([f"{file}: {scenario.title}", *described(scenario), described_domain(scenario), *notes])
-            )
+            tell("\n  ".join([f"{file}: {scenario.title}", *described(scenario), described_domain(scenario), *notes]))
         except ScenarioError as error:
             failed = True
             complain(str(error))

@@ -14,7 +14,7 @@ from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import Density, Length, Model, NonNegative, Point, Positive, Velocity, Whole, set_fields
+from warp_mpm.schema import AsWhole, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
@@ -30,7 +30,7 @@ class FrontAndTail(Model):
     kind: Literal["front_and_tail"]
     depth_m: Length
     """Flow depth h."""
-    squares: Annotated[Whole, Field(ge=0, le=100_000)]
+    squares: Annotated[int, Field(ge=0, le=100_000), AsWhole]
     """Number i of squares between front and tail. Volume (2 + i) h² per metre of width."""
     distance_m: Annotated[float, Field(ge=0.0, le=1e6)]
     """Distance d from the front's toe to the barrier's toe."""

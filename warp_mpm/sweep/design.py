@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError, read_json, sentences
-from warp_mpm.schema import Text, Whole
+from warp_mpm.schema import AsWhole, Text
 
 MOST_CASES = 100_000
 """Most cases of a sweep; more is a typing error."""
@@ -135,9 +135,9 @@ class Sweep(_Model):
     and random: samples of distributions."""
     vary: Annotated[dict[str, Variation], Field(min_length=1)]
     """Fields that vary, by their paths; a number at the end of a path picks from a list, `flow.velocity_m_per_s.0`."""
-    samples: Annotated[Whole, Field(ge=1, le=MOST_CASES)] | None = None
+    samples: Annotated[int, Field(ge=1, le=MOST_CASES), AsWhole] | None = None
     """Number of cases of latin_hypercube and random."""
-    seed: Annotated[Whole, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0), AsWhole] = 0
     """Start of the random numbers: the same seed, the same cases."""
 
     @classmethod
