@@ -242,8 +242,6 @@ def evaluate(path: Path) -> dict[str, Any]:
     Raises:
         ResultsError: the records cannot be read.
     """
-    from warp_mpm import plotting  # a third of a second, which the first step does not wait for
-
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
     taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
@@ -252,10 +250,17 @@ def evaluate(path: Path) -> dict[str, Any]:
         summary = run_folder.finite(summarize(results.scenario, results.time_series, snapshots, of_the_run))
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
-        with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
-            plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
-        plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
+        _draw(results, path)
     return summary
+
+
+def _draw(results: Results, path: Path) -> None:
+    """The first pictures of a run."""
+    from warp_mpm import plotting  # a third of a second, which the first step does not wait for
+
+    with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
+        plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
+    plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
 
 
 def _write_surfaces(results: Results, path: Path) -> None:

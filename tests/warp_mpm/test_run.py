@@ -12,6 +12,8 @@ from warp_mpm.results import Results, ResultsError
 from warp_mpm.run import evaluate, run_scenario
 from warp_mpm.scenario import Scenario
 
+pytestmark = pytest.mark.usefixtures("runs_with_pictures")
+
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
