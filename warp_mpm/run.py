@@ -246,8 +246,6 @@ def evaluate(path: str | Path) -> dict[str, Any]:
     Raises:
         ResultsError: the records cannot be read, or a figure is no finite number.
     """
-    from warp_mpm import plotting  # a third of a second, which the first step does not wait for
-
     path = Path(path)
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
@@ -258,10 +256,17 @@ def evaluate(path: str | Path) -> dict[str, Any]:
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
-        with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
-            plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
-        plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
+        _draw(results, path)
     return summary
+
+
+def _draw(results: Results, path: Path) -> None:
+    """The first pictures of a run."""
+    from warp_mpm import plotting  # a third of a second, which the first step does not wait for
+
+    with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
+        plotting.save(plotting.force_and_displacement(results), path / run_folder.FORCE_PLOT)
+    plotting.save(plotting.pore_pressure(results), path / run_folder.PRESSURE_PLOT)
 
 
 def _write_surfaces(results: Results, path: Path) -> None:

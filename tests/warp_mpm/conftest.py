@@ -118,17 +118,17 @@ class FlyingPoints:
         return points
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def flying_points():
     return FlyingPoints
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def load_scene():
     return lambda name, **changes: Scenario.load(SCENES / f"{name}.json").replaced(changes)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def coarse_case_1(load_scene):
     changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 3.0}
     return Scenario.model_validate(load_scene("case_1").replaced(changes).resolved())

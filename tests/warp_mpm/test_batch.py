@@ -19,18 +19,18 @@ def status(folder):
 
 def test_scenes_run_each_into_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(SCENES.parent)
-    scenes = [str(SCENES / f"{name}.json") for name in ("case_1", "case_1_dry")]
+    scenes = [str(SCENES / f"{name}.json") for name in ("case_1", "case_4")]
     answer = CliRunner().invoke(app, ["run", *scenes, "--out", str(tmp_path / "runs"), "--jobs", "2", *COARSE])
     assert answer.exit_code == 0, answer.output
-    assert [status(tmp_path / "runs" / name) for name in ("case_1", "case_1_dry")] == ["finished"] * 2
+    assert [status(tmp_path / "runs" / name) for name in ("case_1", "case_4")] == ["finished"] * 2
     assert answer.stdout.count("finished") == 2
     assert "\x1b" not in answer.output
 
     # One of the folders is taken: nothing at all is begun.
-    again = CliRunner().invoke(app, ["run", scenes[0], str(SCENES / "case_4.json"), "--out", str(tmp_path / "runs")])
+    again = CliRunner().invoke(app, ["run", scenes[0], str(SCENES / "case_6.json"), "--out", str(tmp_path / "runs")])
     assert again.exit_code == 2
     assert "case_1 holds a run already" in again.stderr
-    assert not (tmp_path / "runs/case_4").exists()
+    assert not (tmp_path / "runs/case_6").exists()
 
 
 def test_stop_ends_what_runs_and_begins_no_more(tmp_path, monkeypatch):
@@ -69,8 +69,8 @@ def test_nothing_is_begun_where_one_scene_cannot_be(tmp_path, files, words):
 
 def test_summaries_as_json(tmp_path, monkeypatch):
     monkeypatch.chdir(SCENES.parent)
-    scene, more = str(SCENES / "case_1.json"), str(SCENES / "case_1_dry.json")
+    scene, more = str(SCENES / "case_1.json"), str(SCENES / "case_4.json")
     one = CliRunner().invoke(app, ["run", scene, "--out", str(tmp_path / "one"), "--json", *COARSE])
     assert json.loads(one.stdout) == json.loads((tmp_path / "one/summary.json").read_text())
     two = CliRunner().invoke(app, ["run", scene, more, "--out", str(tmp_path / "two"), "--json", *COARSE])
-    assert list(json.loads(two.stdout)) == [str(tmp_path / "two" / name) for name in ("case_1", "case_1_dry")]
+    assert list(json.loads(two.stdout)) == [str(tmp_path / "two" / name) for name in ("case_1", "case_4")]

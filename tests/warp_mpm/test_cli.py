@@ -35,6 +35,7 @@ def run(command, *arguments):
     return command("run", SET_IIB, "--spacing", "0.5", "--until", "1", *arguments)
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_run_fills_the_default_folder_and_tells_the_figures(command):
     result = run(command)
     assert result.exit_code == 0, result.output
@@ -152,6 +153,7 @@ def test_divergence_keeps_what_was_computed(command, monkeypatch, flying_points)
     assert Results.open("here").record["status"] == "failed"
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flying_points, number):
     class Interrupted(flying_points):
@@ -174,6 +176,7 @@ def test_interrupt_ends_cleanly_and_says_how_to_go_on(command, monkeypatch, flyi
     assert signal.getsignal(signal.SIGINT) is before  # the shell has its Ctrl-C back
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
     class Interrupted(flying_points):
         def advance(self, until, **stop):

@@ -12,10 +12,11 @@ from warp_mpm.results import Results
 from warp_mpm.run import evaluate, run_scenario
 
 
-@pytest.fixture
-def run(tmp_path, coarse_case_1, flying_points):
-    run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points)
-    return tmp_path / "run"
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, coarse_case_1, flying_points):
+    path = tmp_path_factory.mktemp("ecosystem") / "run"
+    run_scenario(coarse_case_1, path, make_simulation=flying_points)
+    return path
 
 
 def read(path, step):

@@ -129,6 +129,7 @@ def unmade(scenario):
     raise RunFolderError("this test simulates nothing")
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 @settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=QUIET)
 @given(name=st.sampled_from(READ), changes=mutations)
 def test_damaged_run_folders(tmp_path, stopped, name, changes):
@@ -136,6 +137,7 @@ def test_damaged_run_folders(tmp_path, stopped, name, changes):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("runs_with_pictures")
 @settings(max_examples=2000, deadline=None, suppress_health_check=QUIET)
 @given(name=st.sampled_from([*READ, run_folder.SNAPSHOTS]), changes=mutations)
 def test_many_damaged_run_folders(tmp_path, stopped, name, changes):
@@ -189,6 +191,7 @@ def test_more_than_a_machine_holds_is_refused(load_scene, changes, sentence):
         load_scene("case_1", **changes)
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_names_in_a_scenario_lead_nowhere(tmp_path, coarse_case_1, flying_points):
     """No text of a scenario becomes a path."""
     scenario = coarse_case_1.replaced({"title": "../../escaped", "source": "/etc/passwd", "notes": ["../x"]})

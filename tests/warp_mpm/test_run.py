@@ -18,6 +18,7 @@ from warp_mpm.scenario import Scenario
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_a_finished_run(tmp_path, coarse_case_1, flying_points):
     seen = []
     outcome = run_scenario(
@@ -72,6 +73,7 @@ def test_snapshots_hold_the_state(tmp_path, coarse_case_1, flying_points):
         assert frame[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_a_stopped_run_keeps_all_and_says_so(tmp_path, coarse_case_1, flying_points):
     times = []
     outcome = run_scenario(
@@ -115,6 +117,7 @@ def test_an_existing_run_is_refused_before_the_simulation_is_made(tmp_path, coar
         run_scenario(coarse_case_1, tmp_path, make_simulation=lambda scene: pytest.fail("made"))
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 @pytest.mark.parametrize("name", ["case_1_dry", "case_1_fixed", "case_5"])
 def test_scenes_of_every_kind(tmp_path, load_scene, flying_points, name):
     scenario = load_scene(name, **{"numerics.spacing_m": 0.6, "output.end_time_s": 1.0})
@@ -123,6 +126,7 @@ def test_scenes_of_every_kind(tmp_path, load_scene, flying_points, name):
     assert summary["retained_volume"] + summary["on_crest_volume"] + summary["overtopped_volume"] == pytest.approx(45)
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_a_scene_without_barrier_has_a_picture_of_the_flow_alone(tmp_path, load_scene, flying_points):
     scenario = load_scene("case_1", barrier=None, **{"numerics.spacing_m": 0.6, "output.end_time_s": 0.5})
 
@@ -138,6 +142,7 @@ def test_a_scene_without_barrier_has_a_picture_of_the_flow_alone(tmp_path, load_
     assert (tmp_path / run_folder.PRESSURE_PLOT).exists()
 
 
+@pytest.mark.usefixtures("runs_with_pictures")
 def test_evaluation_can_be_repeated(tmp_path, coarse_case_1, flying_points):
     outcome = run_scenario(coarse_case_1, tmp_path, make_simulation=flying_points)
     (tmp_path / run_folder.SUMMARY).unlink()
