@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from ..simulator.bodies.kernels import DEEP
 from .elementary import make_elementary
 from .layout import (
     DIVERGED,
@@ -160,7 +161,7 @@ def make_constitutive(
             solid = wp.int32(1)
             if RESTING:
                 if within:
-                    solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy))
+                    solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy)) & wp.static(DEEP)
             if solid != 0:
                 for body in range(bodies.count):
                     if in_box(read(bodies.ahead, body), x):

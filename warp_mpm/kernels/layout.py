@@ -170,7 +170,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.bodies and not effects.passing:
-        grid["solid"] = array(dtype=wp.int32, ndim=2)  # 1: a point in the cell may be too deep in a body
+        grid["solid"] = array(dtype=wp.int32, ndim=2)  # what a point in the cell may be near
     if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
     if effects.density_correction:

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from ..simulator.bodies.kernels import RUBBED, RUBS
 from .elementary import make_elementary
 from .layout import (
     BLOCK,
@@ -57,6 +58,7 @@ def make_transfer(
     LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
     in_hull = bodies_of.in_hull if LIQUID_ALONE else None
     MOVING = effects.moving
+    RESTING = not effects.passing
     Bodies = types.Bodies
     POROSITY = effects.porosity_update
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
@@ -199,17 +201,20 @@ def make_transfer(
             rubbed = wp.bool(False)
             # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
-            for body in range(bodies.count):
-                if read(bodies.rubs, body) == 1:
-                    seen = x
-                    if MOVING:
-                        moved = bodies.displacement[body]
-                        seen -= V2(F(moved[0]), F(moved[1]))
-                    reach = F(3.0) * parameters.spacing
-                    first_piece = read(bodies.first_piece, body)
-                    last_piece = read(bodies.first_piece, body + 1)
-                    if in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
-                        rubbed = wp.bool(True)
+            if RESTING:
+                rubbed = (read(grid.solid, ci * parameters.rows + cj) & wp.static(RUBS)) != 0
+            else:
+                for body in range(bodies.count):
+                    if read(bodies.rubs, body) == 1:
+                        seen = x
+                        if MOVING:
+                            moved = bodies.displacement[body]
+                            seen -= V2(F(moved[0]), F(moved[1]))
+                        reach = F(wp.static(RUBBED)) * parameters.spacing
+                        first_piece = read(bodies.first_piece, body)
+                        last_piece = read(bodies.first_piece, body + 1)
+                        if in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
+                            rubbed = wp.bool(True)
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
                 alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio

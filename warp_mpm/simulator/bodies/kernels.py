@@ -9,6 +9,13 @@ from warp_mpm.effects import Effects
 
 from .outline import TIE
 
+DEEP, RUBS = 1, 2
+"""Bits of the grid's `solid`: a point in the cell may be half a cell deep in a body, or within `RUBBED` cells of one that
+rubs."""
+
+RUBBED = 3.0
+"""Cells from a surface within which points may share a node with it."""
+
 PIECE = 9
 """Numbers of a piece: begin (x, y), along (x, y), low, high, normal (x, y), offset, as in `outline.Segments`."""
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mpm.grid import GridLayout
 
 from .body import Body
+from .kernels import DEEP, RUBBED, RUBS
 from .outline import Segments
 
 
@@ -47,16 +48,20 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
 
 
 def solid_cells(bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.int32]:
-    """1 where a point in the cell around a node [columns, rows] may be half a cell deep in a body that lies still as
-    seen from the grid; an edge of the domain sets no point back."""
+    """What a point in the cell around a node [columns, rows] may be near, in the bits of `kernels.DEEP` and
+    `kernels.RUBS`, of bodies that lie still as seen from the grid; an edge of the domain is smooth and sets no point
+    back."""
     x, y = grid.node_positions()
     window = (x[0] - grid.spacing, x[-1] + grid.spacing, y[0] - grid.spacing, y[-1] + grid.spacing)
     found = np.zeros((grid.columns, grid.rows), dtype=np.int32)
     # From the middle of a cell to its corner it is 0.71 cells.
-    near = 0.25 * grid.spacing
+    corner = 0.75 * grid.spacing
     for body in bodies:
         if not body.edge:
-            found[_distance(body.outline.segments, x, y, window, grid.spacing) < near] = 1
+            distance = _distance(body.outline.segments, x, y, window, grid.spacing)
+            found[distance < corner - 0.5 * grid.spacing] |= DEEP
+            if body.rubs:
+                found[distance < corner + RUBBED * grid.spacing] |= RUBS
     return found
 
 
@@ -78,8 +83,9 @@ def _distance(
         box = solid.box(*window)
         if box is None:
             return low
-        columns = (x >= box[0] - 2.0 * spacing) & (x <= box[1] + 2.0 * spacing)
-        rows = (y >= box[2] - 2.0 * spacing) & (y <= box[3] + 2.0 * spacing)
+        reach = (RUBBED + 1.0) * spacing
+        columns = (x >= box[0] - reach) & (x <= box[1] + reach)
+        rows = (y >= box[2] - reach) & (y <= box[3] + reach)
     place = np.stack(np.meshgrid(x[columns], y[rows], indexing="ij"), axis=-1)
     low[np.ix_(columns, rows)] = solid.nearest(place.reshape(-1, 2))[0].reshape(place.shape[:2])
     return low
