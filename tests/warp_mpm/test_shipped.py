@@ -1,6 +1,8 @@
 """The scenes that come with the program, and what a user is told who lacks something."""
 
 import json
+import os
+import subprocess
 import sys
 import tomllib
 from importlib import metadata
@@ -126,3 +128,12 @@ def test_a_bare_checkout_has_a_hint_too(monkeypatch):
 
     monkeypatch.setattr(metadata, "requires", unknown)
     assert extras.missing("It", "Dask", "sweep") == "It needs Dask: pip install '.[sweep]' in the project's folder"
+
+
+def test_a_users_file_does_not_stand_in_for_a_package_of_ours(tmp_path):
+    (tmp_path / "analytic.py").write_text("raise SystemExit('the wrong one')")
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "warp_mpm", "--version"]
+    answer = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.startswith(PROJECT)

@@ -10,8 +10,8 @@ from warp_mpm.effects import Effects
 from .outline import TIE
 
 DEEP, RUBS = 1, 2
-"""Bits of the grid's `solid`: a point in the cell may be half a cell deep in a body, or within `RUBBED` cells of one that
-rubs."""
+"""Bits of the grid's `solid`: a point in the cell may be half a cell deep in a body, or within `RUBBED` cells of one
+that rubs."""
 
 RUBBED = 3.0
 """Cells from a surface within which points may share a node with it."""
