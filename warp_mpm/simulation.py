@@ -509,7 +509,7 @@ class Simulation:
             raise ValueError("set_barrier_velocity needs a barrier whose motion is of the kind 'prescribed'")
         if not abs(velocity) <= LARGEST_VELOCITY:
             raise ValueError(_out_of_range("velocity", velocity, LARGEST_VELOCITY, "m/s"))
-        first, last = self._body_arrays["first_time"].numpy()[self._barrier : self._barrier + 2]
+        first, last = (int(place) for place in self._body_arrays["first_time"].numpy()[self._barrier :][:2])
         self._fill(self._body_arrays["velocities"][first:last], (float(velocity), 0.0))
 
     def set_external_force(self, force: float) -> None:
@@ -572,7 +572,7 @@ class Simulation:
     def window(self) -> Window:
         """A mark of the present time, since which `sample` can tell mean forces. It belongs to the caller."""
         base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
-        return Window(self.time, self._read("reactions").tolist(), base_impulse)
+        return Window(self._clock_entry(at.TIME), self._read("reactions").tolist(), base_impulse)
 
     @_one_thread_at_a_time_on_a_gpu
     def sample(self, names: Collection[str] | None = None, *, since: Window | None = None) -> dict[str, float]:
@@ -617,6 +617,7 @@ class Simulation:
             left=self._read("left").tolist(),
             initial_momentum=self._initial_momentum,
         )
+        values["time"] = self.time
         for name, value in values.items():
             if not math.isfinite(value):
                 raise SimulationDiverged(

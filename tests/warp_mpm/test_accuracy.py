@@ -385,7 +385,7 @@ class TestPurchase:
         """As a scene without a barrier, of which alone the sentence spoke."""
         silent = [Rung(rung.spacing, rung.time, dict.fromkeys(rung.figures, 0.0)) for rung in self.LADDER]
         with pytest.raises(PurchaseError, match="In none of the probes did the flow reach a barrier"):
-            choose(silent, self.SOLD, budget=60.0)
+            choose(silent, self.SOLD, taken, budget=60.0)
 
     def test_says_what_can_be_had(self) -> None:
         # 1.25 times 0.2 times 3 m / 120.

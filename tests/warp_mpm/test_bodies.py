@@ -23,7 +23,8 @@ from warp_mpm.simulator.bodies.nodes import contact_nodes
 from warp_mpm.simulator.bodies.of_scene import scene_bodies
 from warp_mpm.validation.scenes import box, scene
 
-SCENES = sorted((Path(__file__).parents[2] / "scenarios").glob("**/*.json"))
+FOLDER = Path(__file__).parents[2] / "scenarios"
+SCENES = sorted([*FOLDER.glob("*.json"), *FOLDER.glob("hard/*.json")])
 ANGLES = 2.0 * np.pi * np.arange(24) / 24.0
 CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
 NOTCHED = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [2.0, 1.0], [0.0, 3.0]]

@@ -430,7 +430,7 @@ class TestOddScenes:
             def measure(self, scenario: Scenario, limit: float) -> dict[str, Any]:
                 return super().measure(scenario, limit) | {"figures": {"peak_force": 0.0, "impulse": 0.0}}
 
-        with pytest.raises(PurchaseError, match="Nothing hits the barrier until the end of the run"):
+        with pytest.raises(PurchaseError, match="In none of the probes did the flow reach a barrier"):
             buy(dry, budget=60.0, bench=Missed())
 
     def test_very_short_run(self, dry: Scenario) -> None:

@@ -68,7 +68,8 @@ def test_a_sample_tells_of_any_velocity_that_is_no_number(simulation, component)
 def test_a_barrier_at_any_speed_keeps_the_flow_on_the_grid(load_scene):
     """At 3 km/s the grid, which rides with the barrier, passes several of its cells in a step."""
     motion = {"kind": "prescribed", "times_s": [0.0, 0.02], "velocities_m_per_s": [0.0, 3000.0]}
-    simulation = Simulation(load_scene("case_1", **{"numerics.spacing_m": 0.5, "barrier.motion": motion}))
+    changes = {"numerics.spacing_m": 0.5, "barrier.motion": motion, "domain.left_m": -40.0, "domain.right_m": 40.0}
+    simulation = Simulation(load_scene("case_1", **changes))
     for time in np.linspace(0.01, 0.1, 10):
         simulation.advance(time)
         sample = simulation.sample()
@@ -159,10 +160,10 @@ def test_a_hard_case_that_does_not_bear_half_the_time_step_fails(coarse_case_1):
     scenario = coarse_case_1.replaced({"numerics.spacing_m": 0.75, "output.end_time_s": 0.6})
 
     class Brittle(Simulation):
-        def advance(self, until):
+        def advance(self, until, **stop):
             if self.scenario.numerics.courant_number < 0.5 and until > 0.5:
                 raise SimulationDiverged("It broke.")
-            super().advance(until)
+            super().advance(until, **stop)
 
     measured = measure(scenario, halve=True, make_simulation=Brittle)
     failed = [criterion.figure for criterion, _ in measured.failures(scenario)]

@@ -25,7 +25,7 @@ class Clock:
     def __init__(self):
         self.time, self.visited = 0.0, [0.0]
 
-    def advance(self, until):
+    def advance(self, until, **stop):
         assert until > self.time
         self.time = until
         self.visited.append(until)

@@ -298,7 +298,17 @@ def test_content_follows_what_a_law_calls_and_not_its_comments():
 
 def test_a_modules_name_fits_into_a_file_name():
     everything = dict.fromkeys(
-        ("density_correction", "bulk_viscosity", "porosity_update", "barrier_friction", "side_walls", "ceiling"), True
+        (
+            "density_correction",
+            "bulk_viscosity",
+            "porosity_update",
+            "bodies",
+            "friction",
+            "sliding",
+            "driven",
+            "passing",
+        ),
+        True,
     )
     names = {
         Effects(

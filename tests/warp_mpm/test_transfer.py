@@ -8,6 +8,7 @@ import pytest
 from warp_mpm.kernels import layout as at
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.step import launches
 
 GRAVITY = np.array([0.3, -9.7])
 TIME_STEP = 2e-4
@@ -76,14 +77,16 @@ class Bench:
     def get(self, name):
         return self.simulation._point_arrays[name].numpy()
 
+    def launch(self, kernel):
+        simulation = self.simulation
+        (launch,) = (one for one in launches(simulation.effects, simulation.bodies) if one.kernel == kernel)
+        arguments = [simulation._arguments[name] for name in launch.takes]
+        simulation._launch(launch, simulation._counts[launch.over], arguments)
+
     def scatter(self):
         simulation = self.simulation
-        grid, parameters = simulation._grid, simulation._parameters
-        simulation._launch("clear", simulation._workers, grid, parameters)
-        simulation._launch("forget", 1, grid)
-        simulation._launch(
-            "scatter", self.number, simulation._points, grid, parameters, simulation._bodies, simulation._clock
-        )
+        for kernel in ("clear", "forget", "scatter"):
+            self.launch(kernel)
         return {name: array.numpy() for name, array in simulation._grid_arrays.items()}
 
     def gather(self, velocity, increment=None):
@@ -91,9 +94,7 @@ class Bench:
         simulation._grid_arrays["velocity"].assign(velocity)
         if increment is not None:
             simulation._grid_arrays["increment"].assign(increment)
-        simulation._launch(
-            "gather", self.number, simulation._points, simulation._grid, simulation._parameters, simulation._clock
-        )
+        self.launch("gather")
 
     def internal_force(self):
         """Force [columns, rows, 2 phases] on the nodes [N/m], of each phase's total stress (audit, section 3.4)."""

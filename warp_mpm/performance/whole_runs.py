@@ -34,10 +34,10 @@ class _Watched:
         if name != self._call:
             return value
 
-        def timed(*arguments: Any) -> Any:
+        def timed(*arguments: Any, **named: Any) -> Any:
             begin = self._clock()
             try:
-                return value(*arguments)
+                return value(*arguments, **named)
             finally:
                 self.spent += self._clock() - begin
                 self.calls += 1
