@@ -24,7 +24,6 @@ from typing import NoReturn
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from analytic.impact import friction_deceleration
 from warp_mpm import Scenario
 
 UNITS = ("DebrisFlow", "BarrierSliding", "GroundAnchor")
@@ -102,11 +101,9 @@ def barrier_parameters(scenario: Scenario, barrier_mass: float | None = None) ->
             f"{scenario.title}: the barrier's base friction is {friction:.3g}, it must be greater than the slope's "
             f"tangent, {abs(math.tan(math.radians(slope))):.3g}: BarrierSliding knows no barrier that slides by itself."
         )
-    effective = gravity.acceleration_m_per_s2
-    if slope:  # The unit has no slope; less gravity on its base does the same.
-        effective = friction_deceleration(effective, friction, slope) / friction
     mass = barrier_mass if barrier_mass is not None else scenario.barrier.mass
-    return {"barrier_mass": mass, "base_friction": friction, "gravity": effective}
+    acceleration = gravity.acceleration_m_per_s2
+    return {"barrier_mass": mass, "base_friction": friction, "gravity": acceleration, "slope": slope}
 
 
 def run_coupled(

@@ -99,7 +99,9 @@ def benchmark(
         if out is not None:
             _write(out, what, tables, machine())
         if page is not None:
-            put_into_page(page, tables, _machine_line(machine()))
+            # Tables of a GPU are of another machine than those of the CPU beside them.
+            place = "gpu machine" if what is What.gpu else "machine"
+            put_into_page(page, tables, _machine_line(machine()), machine=place)
         if not agree:
             raise typer.Exit(1)
 

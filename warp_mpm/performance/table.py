@@ -27,15 +27,16 @@ class Table:
         return "\n".join(lines) + "\n"
 
 
-def put_into_page(page: Path, tables: Sequence[Table], taken_on: str) -> None:
+def put_into_page(page: Path, tables: Sequence[Table], taken_on: str, *, machine: str = "machine") -> None:
     """Replace each table between its `<!-- benchmark NAME -->` and the next `<!-- end -->` of a Markdown page, and what
-    they were taken on between `<!-- benchmark machine -->` and its end. What the page has no place for is left out.
+    they were taken on between `<!-- benchmark machine -->` (or another name for it) and its end. What the page has no
+    place for is left out.
 
     Raises:
         ValueError: the page cannot be read, or has no place for any of them.
     """
     text = page.read_text(encoding="utf-8") if page.is_file() else ""
-    blocks = {table.name: table.markdown() for table in tables} | {"machine": f"{taken_on}\n"}
+    blocks = {table.name: table.markdown() for table in tables} | {machine: f"{taken_on}\n"}
     found = 0
     for name, block in blocks.items():
         begin, end = f"<!-- benchmark {name} -->", "<!-- end -->"
