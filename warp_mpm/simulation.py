@@ -49,9 +49,12 @@ MOST_STEPS_AT_ONCE = 2**30
 
 STATE_OF_BODIES = (
     *("displacement", "velocity", "old_velocity", "impulse", "work"),
-    *("ahead", "next", "external_force", "base_impulse", "base_work", "times", "velocities"),
+    *("ahead", "next", "external_force", "base_impulse", "base_work", "times", "velocities", "held"),
 )
 """Arrays of the bodies that change during a run."""
+
+STATE_OF_CONTACT = ("last", "solid", "liquid", "alone", "rubbed")
+"""Arrays of the places of contact that change during a run and are not formed anew in every step."""
 
 
 def _check_names(bodies: Sequence[Body]) -> None:
@@ -203,9 +206,11 @@ class Simulation:
             "points": self._points,
             "grid": self._grid,
             "bodies": self._bodies,
+            "contact": self._contact,
             "parameters": self._parameters,
         }
         self._counts = {"one": 1, "workers": self._workers, "points": self.material_points}
+        self._counts["groups"] = len(self._contact_arrays["block"]) if self.bodies else 0
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -228,7 +233,8 @@ class Simulation:
         self._grid, self._grid_arrays = grid.structure, grid.arrays
         solid = body_arrays(self.bodies, effects, types, self.grid, scenario.gravity.vector, device=device)
         self._bodies, self._body_arrays = solid.structure, solid.arrays
-        self._contacts = contact_arrays(self.bodies, effects, types, self.grid, device=device)
+        contact = contact_arrays(self.bodies, effects, types, self.grid, device=device) if self.bodies else None
+        self._contact, self._contact_arrays = (contact.structure, contact.arrays) if contact else (None, {})
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
         self._clock = self._clock_arrays["clock"]
@@ -253,21 +259,14 @@ class Simulation:
     def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
         kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
-        told = f"{launch.kernel} {launch.of}" if launch.of else launch.kernel
         if self._commands is not None:
-            self._commands.append((told, command))
+            self._commands.append((launch.kernel, command))
         if self._on_launch is not None:
-            self._on_launch(told)
+            self._on_launch(launch.kernel)
 
     def _step(self) -> None:
-        contacts = {body.name: contact for body, contact in zip(self.bodies, self._contacts, strict=True)}
-        for launch in launches(self.effects, self.bodies):
-            counts, arguments = self._counts, self._arguments
-            if launch.of:
-                contact = contacts[launch.of]
-                counts = counts | {"places": len(contact.arrays["node"]), "groups": len(contact.arrays["block"])}
-                arguments = arguments | {"contact": contact.structure}
-            self._launch(launch, counts[launch.over], [arguments[name] for name in launch.takes])
+        for launch in launches(self.effects):
+            self._launch(launch, self._counts[launch.over], [self._arguments[name] for name in launch.takes])
 
     def _start(self) -> None:
         self._launch(START, 1, [self._arguments[name] for name in START.takes])
@@ -307,7 +306,7 @@ class Simulation:
     def arrays(self) -> dict[str, int]:
         """Every array that the simulation holds on the device, by name, with its bytes."""
         groups = {"points": self._point_arrays, "grid": self._grid_arrays, "bodies": self._body_arrays}
-        groups |= {f"contact.{b.name}": c.arrays for b, c in zip(self.bodies, self._contacts, strict=True)}
+        groups["contact"] = self._contact_arrays
         held = {f"{group}.{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
         return {name: int(array.capacity) for name, array in (held | self._clock_arrays).items()}
 
@@ -659,6 +658,8 @@ class Simulation:
             "grid.shift": self._grid_arrays["shift"],
         }
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
+        # The impulses of a step begin with those of the step before.
+        arrays |= {f"contact.{name}": array for name, array in self._contact_arrays.items() if name in STATE_OF_CONTACT}
         return arrays
 
     @_one_thread_at_a_time_on_a_gpu

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..effects import Effects
-from ..simulator.bodies.kernels import make_body_functions, make_place
+from ..simulator.bodies.kernels import make_body_functions
 from ..simulator.laws.law import all_functions as law_functions
 from ..simulator.schemes.scheme import all_functions as scheme_functions
 from .clock import make_clock
@@ -19,7 +19,6 @@ from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
 from .pore_pressure import make_pore_pressure
-from .rigid_barrier import make_rigid_barrier
 from .seepage import make_seepage
 from .shape_functions import make_shape_functions
 from .transfer import make_transfer
@@ -60,10 +59,5 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     if effects.two_phase:
         kernels.seep = make_seepage(types, module).seep
     if effects.bodies:
-        contact = make_contact(types, module)
-        kernels.__dict__.update(contact.kernels)
-        if effects.passing:
-            kernels.place = make_place(types, bodies, module)
-        if effects.sliding:
-            kernels.slide = make_rigid_barrier(types, contact, bodies, module).slide
+        kernels.__dict__.update(make_contact(types, shapes, bodies, module).__dict__)
     return kernels

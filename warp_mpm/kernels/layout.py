@@ -223,7 +223,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4, P)
-    contact = contact_fields(effects, scalar, V2, V, P) if effects.bodies else {}
+    contact = contact_fields(effects, scalar, V2, V3) if effects.bodies else {}
 
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)

@@ -11,11 +11,9 @@ class Launch:
     """One launch of a kernel."""
 
     kernel: str
-    over: Literal["one", "workers", "points", "places", "groups"]
-    """What its threads count: workers share the blocks of the grid in use; places and groups are a body's."""
+    over: Literal["one", "workers", "points", "groups"]
+    """What its threads count: workers share the blocks of the grid in use; groups are of places of contact."""
     takes: tuple[str, ...]
     """Its arguments, by the names under which the simulation knows them."""
     does: str
     """What it does, in a clause."""
-    of: str = ""
-    """The body that it acts for."""

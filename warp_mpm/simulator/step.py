@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from ..effects import Effects
-from .bodies import Body, Sliding
-from .bodies.arrays import passes
 from .launch import Launch
 
 START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies", "grid"), "begins an interval")
 LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "sums"), "sums over the points, for a sample")
 
 
-def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
+def launches(effects: Effects) -> tuple[Launch, ...]:
     """The kernels of a step for `effects`, in their order; a scheme's own ones stand where it says."""
     grid = ("grid", "parameters", "clock")
     points = ("points", "grid", "parameters", "bodies", "clock")
@@ -23,8 +21,12 @@ def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
         Launch("scatter", "points", points, "mass, momentum and internal force of the points to the nodes"),
         Launch("move", "workers", grid, "velocities of the nodes at the end of the step, drag included"),
     ]
-    for body in bodies:
-        step += _contact(body, passes(body, bodies))
+    if effects.bodies:
+        seen = ("contact", "bodies", *grid)
+        step += [
+            Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another"),
+            Launch("join", "one", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide"),
+        ]
     if effects.two_phase:
         seen = ("grid", "parameters", "balance")
         step.append(Launch("seep", "workers", seen, "rate at which gravity works on liquid that seeps"))
@@ -45,21 +47,6 @@ def launches(effects: Effects, bodies: Sequence[Body]) -> tuple[Launch, ...]:
         ),
     ]
     return _inserted(step, effects.scheme.launches())
-
-
-def _contact(body: Body, passing: bool) -> list[Launch]:
-    """Contact of the flow with one body."""
-    seen = ("contact", "bodies", "grid", "parameters")
-    found = [Launch("place", "places", seen, "finds the nodes of a body that passes", body.name)] if passing else []
-    if isinstance(body.motion, Sliding):
-        takes = (*seen, "clock", "counters")
-        return [
-            *found,
-            Launch("collect", "places", seen, "what the body's surface sees of the flow", body.name),
-            Launch("slide", "one", takes, "the body's velocity, together with the contact", body.name),
-            Launch("push", "places", (*seen, "clock", "reactions"), "contact with the body", body.name),
-        ]
-    return [*found, Launch("press", "groups", (*seen, "clock", "reactions"), "contact with the body", body.name)]
 
 
 def _inserted(step: list[Launch], own: Iterable[tuple[str, Launch]]) -> tuple[Launch, ...]:

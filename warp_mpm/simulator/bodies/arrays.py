@@ -16,7 +16,7 @@ from warp_mpm.effects import Effects
 from warp_mpm.grid import GridLayout
 
 from .body import Body, Driven, Sliding
-from .nodes import acting_outline, contact_nodes
+from .places import Places, by_block, places_of, sharing
 from .outline import ENDLESS
 
 
@@ -133,76 +133,37 @@ def body_arrays(
 
 def contact_arrays(
     bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
-) -> list[Group]:
-    """Where each body acts, and what is gathered there in a step."""
+) -> Group:
+    """Where the bodies act, and what they give there in a step."""
+    passing = [passes(body, bodies) for body in bodies]
+    places = places_of(bodies, grid, passing)
+    joined = sharing(places, bodies, grid, passing)
+    order, block, start = by_block(places.chosen(~joined), grid)
+    places = Places.joined([places.chosen(~joined).chosen(order), places.chosen(joined)])
     first = _firsts([len(body.surfaces) for body in bodies])
-    groups = []
-    for number, body in enumerate(bodies):
-        passing = passes(body, bodies)
-        found = _window(body, grid, types) if passing else _resting(body, grid)
-        surface = "surfaces" if passing else "surface"
-        found[surface] = found[surface] + first[number]
-        fields = {
-            name: field
-            for name, field in types.contact_fields.items()
-            if name in _ALWAYS
-            or (name in _SLIDING and isinstance(body.motion, Sliding))
-            or (passing and name not in _SLIDING)
-        }
-        given = {"body": number} | found
-        shapes = dict.fromkeys(types.contact_fields, found["places"])
-        if not passing and isinstance(body.motion, Sliding):
-            # Those that rub come first: what the liquid would do alone is kept for them and no others.
-            friction = np.array([surface.friction for surface in body.surfaces])
-            rubs = friction[found["surface"] - first[number]] > 0.0
-            order = np.argsort(~rubs, kind="stable")
-            given |= {name: found[name][order] for name in ("node", "mirror", "normal", "surface")}
-            given |= {"block": np.array([-1], dtype=np.int32), "start": np.array([0, len(order)], dtype=np.int32)}
-            shapes["liquid_free"] = int(rubs.sum())
-        groups.append(filled(types.Contact(), fields, given, shapes, device))
-    return groups
-
-
-_ALWAYS = ("body", "node", "mirror", "normal", "surface", "block", "start")
-_SLIDING = ("pair", "mass", "velocity", "liquid_free")
-
-
-def _resting(body: Body, grid: GridLayout) -> dict[str, Any]:
-    nodes = contact_nodes(body, grid)
-    return {
-        "places": len(nodes.node),
-        "node": nodes.node,
-        "mirror": nodes.mirror,
-        "normal": nodes.normal,
-        "surface": nodes.surface,
-        "block": nodes.block,
-        "start": nodes.start,
+    surface_of = [np.array(body.surface_of_piece, dtype=np.int32) + first[k] for k, body in enumerate(bodies)]
+    given = {
+        "alone_count": int((~joined).sum()),
+        "body": places.body,
+        "surface": np.array([surface_of[b][p] for b, p in zip(places.body, places.piece, strict=True)], dtype=np.int32),
+        "position": places.position,
+        "normal": places.normal,
+        "fixed": (places.first >= 0).astype(np.int32),
+        "first": places.first,
+        "weight_x": places.weight_x,
+        "weight_y": places.weight_y,
+        "block": block,
+        "start": start,
     }
-
-
-def _window(body: Body, grid: GridLayout, types: SimpleNamespace) -> dict[str, Any]:
-    """For the kernel `place`: the nodes around a body that moves relative to the grid, wherever that lies along x."""
-    acting = acting_outline(body, grid, passing=True)
-    spacing = grid.spacing
-    low, high = (-math.inf, math.inf) if body.moves else (grid.bottom, grid.bottom + grid.rows * spacing)
-    box = acting.outline.box(-ENDLESS, ENDLESS, max(low, -ENDLESS), min(high, ENDLESS))
-    assert box is not None
-    reach = (acting.depth + 1.0) * spacing
-    columns = int(min((box[1] - box[0] + 2.0 * reach) / spacing + 2.0, grid.columns))
-    rows = int(min((box[3] - box[2] + 2.0 * reach) / spacing + 2.0, grid.rows))
-    return {
-        "places": columns * rows,
-        "block": np.full(columns, -1, dtype=np.int32),
-        "start": (np.arange(columns + 1) * rows).astype(np.int32),
-        "pieces": acting.outline.numbers,
-        "crest": np.minimum(acting.crest, ENDLESS),
-        "surfaces": np.array(body.surface_of_piece, dtype=np.int32),
-        "corner": types.V2(max(box[0] - reach, -ENDLESS), max(box[2] - reach, -ENDLESS)),
-        "columns": columns,
-        "rows": rows,
-        "depth": acting.depth,
-        "edge": int(body.edge),
-    }
+    if effects.friction:
+        number = np.arange(len(places), dtype=np.int32)
+        along = (places.first[:-1] < 0) & (places.body[:-1] == places.body[1:]) & (places.piece[:-1] == places.piece[1:])
+        along &= places.first[1:] < 0
+        given["before"] = number - np.append(False, along)
+        given["after"] = number + np.append(along, False)
+        given = {k: v.astype(np.int32) if k in ("before", "after") else v for k, v in given.items()}
+    shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1}
+    return filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 
 def _box(body: Body, bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.float64]:

@@ -59,6 +59,8 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
             "external_force",  # [B] along x [N/m]
             "base_impulse",  # [B] of friction at the base, positive when it acts downstream [N s/m]
             "base_work",  # [B] that friction at the base has taken [J/m]
+            "held",  # [B] impulse of friction at the base in the step [N s/m]
+            "pressed",  # [B] of the flow along y in the step [N s/m]
         ):
             fields[name] = array(dtype=wp.float64)
     if effects.driven:
@@ -68,37 +70,35 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
     return fields
 
 
-def contact_fields(effects: Effects, scalar: Any, V2: Any, V: Any, P: Any) -> dict[str, Any]:
-    """Fields of the structure `Contact`, one per body: its C places of contact, in groups that share a block."""
+def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str, Any]:
+    """Fields of the structure `Contact`: C places of contact of all bodies, first those that stand alone."""
     array = wp.array
     fields: dict[str, Any] = {
-        "body": wp.int32,
-        "node": array(dtype=wp.vec2i),
-        "mirror": array(dtype=wp.vec2i),  # (-1, -1): none
+        "alone_count": wp.int32,
+        "body": array(dtype=wp.int32),
+        "surface": array(dtype=wp.int32),
+        "position": array(dtype=V2),  # at t = 0 [m]
         "normal": array(dtype=V2),
-        "surface": array(dtype=wp.int32),  # -1: nothing acts here
-        "block": array(dtype=wp.int32),  # [groups]; -1: not in one block
+        "fixed": array(dtype=wp.int32),  # 1: the nodes are always the same
+        "first": array(dtype=wp.int32),  # lowest of the 3 x 3 nodes, counted through; -1: outside the grid
+        "weight_x": array(dtype=V3),
+        "weight_y": array(dtype=V3),
+        "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
+        "active": array(dtype=wp.int32),  # those of the joined places where something is
+        "last": array(dtype=wp.float64),  # time step of the impulses [s]
+        "solid": array(dtype=scalar),  # impulses of the step [N s/m]: on the solid along the normal,
+        "block": array(dtype=wp.int32),  # [groups] of those that stand alone
         "start": array(dtype=wp.int32),  # [groups + 1]
     }
-    if effects.sliding:
-        # Gathered each step, for the body's equation of motion.
-        fields["pair"] = array(dtype=wp.int32)  # 1: acts with its mirror image
-        fields["mass"] = array(dtype=scalar)
-        fields["velocity"] = array(dtype=V)
-        if effects.friction and effects.liquid:
-            fields["liquid_free"] = array(dtype=V2)  # what the liquid would do alone, for the effective normal force
-    if effects.passing:
-        # Of the outline behind whose pieces nodes act, and its window of nodes, by which the places are found anew.
-        fields |= {
-            "pieces": array(dtype=P),
-            "crest": array(dtype=scalar),
-            "surfaces": array(dtype=wp.int32),
-            "corner": V2,
-            "columns": wp.int32,
-            "rows": wp.int32,
-            "depth": scalar,
-            "edge": wp.int32,
-        }
+    if effects.two_phase:
+        fields["liquid"] = array(dtype=scalar)  # on the liquid,
+    if effects.friction:
+        # Neighbours along the piece, or the place itself.
+        fields["before"] = array(dtype=wp.int32)
+        fields["after"] = array(dtype=wp.int32)
+        fields["rubbed"] = array(dtype=scalar)  # on the solid along the surface,
+        if effects.liquid:
+            fields["alone"] = array(dtype=scalar)  # on liquid that fills the volume, as it would move alone
     return fields
 
 
@@ -222,55 +222,3 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
         set_back=set_back,
     )
 
-
-def make_place(types: SimpleNamespace, functions: SimpleNamespace, module: str) -> Any:
-    """Build the kernel `place` (over the window's nodes): where a body acts that moves relative to the grid. It is the
-    rule of `nodes.contact_nodes`, seen from the grid as it lies now; only an edge of the domain acts on pairs."""
-    F = types.scalar
-    V2 = types.V2
-    Contact, Bodies, Grid, Parameters = types.Contact, types.Bodies, types.Grid, types.Parameters
-    nearest, normal_of, displaced = functions.nearest, functions.normal_of, functions.displaced
-
-    @wp.kernel(module=module)
-    def place(contact: Contact, bodies: Bodies, grid: Grid, parameters: Parameters):
-        e = wp.tid()
-        at = displaced(bodies, contact.body)
-        spacing = parameters.spacing
-        origin = V2(parameters.left + F(grid.shift[0]), parameters.bottom)
-        if contact.edge == 1:
-            edge = contact.pieces[0]
-            n = normal_of(edge)
-            axis = V2(wp.abs(n[0]), wp.abs(n[1]))
-            line = (edge[8] * (n[0] + n[1]) - wp.dot(axis, origin)) * parameters.inverse_spacing
-            at += ((wp.floor(line + F(0.5)) - line) * spacing) * axis
-        i = wp.int32(0)
-        j = wp.int32(0)
-        if contact.columns < parameters.columns:
-            i = wp.int32(wp.floor((contact.corner[0] + at[0] - origin[0]) * parameters.inverse_spacing))
-        if contact.rows < parameters.rows:
-            j = wp.int32(wp.floor((contact.corner[1] + at[1] - origin[1]) * parameters.inverse_spacing))
-        i += e / contact.rows
-        j += e % contact.rows
-        surface = wp.int32(-1)
-        mirror = wp.vec2i(-1, -1)
-        if i >= 0 and i < parameters.columns and j >= 0 and j < parameters.rows:
-            seen = origin + spacing * V2(F(i) + F(0.5), F(j) + F(0.5)) - at
-            distance, _direction, piece = nearest(contact.pieces, 0, contact.pieces.shape[0], seen)
-            distance *= parameters.inverse_spacing
-            acts = distance < F(0.0) and distance > -contact.depth
-            if contact.edge == 0 and distance > F(-0.5):
-                acts = acts and seen[1] <= contact.crest[piece] - spacing * F(1.0 - 1.0e-9)
-            if acts:
-                surface = contact.surfaces[piece]
-                normal = normal_of(contact.pieces[piece])
-                contact.normal[e] = normal
-                if contact.edge == 1 and distance > F(-1.0):
-                    mi = i + wp.int32(normal[0])
-                    mj = j + wp.int32(normal[1])
-                    if mi >= 0 and mi < parameters.columns and mj >= 0 and mj < parameters.rows:
-                        mirror = wp.vec2i(mi, mj)
-        contact.node[e] = wp.vec2i(i, j)
-        contact.mirror[e] = mirror
-        contact.surface[e] = surface
-
-    return place

@@ -1,0 +1,202 @@
+"""Places of contact: where along its outline a body acts on the grid.
+
+At a place of contact a body sees the flow's velocity there, and its impulse goes to the same nodes with the same
+weights, so that what it takes from the flow is what the flow takes from it.
+
+A piece of outline along a line of cell corners acts on mirrored pairs of nodes, of which the mean is the velocity at
+the surface itself, and on the nodes a row further back, one by one. Any other acts at points of the surface, with the
+splines' own weights, two to a cell.
+
+Most pairs share no node with another place: each is done on its own. Where places share nodes, at an inclined face, in
+a corner, and wherever a body slides, they are joined: their impulses are found together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm.grid import GridLayout
+from warp_mpm.kernels.layout import BLOCK
+
+from .body import Body, Sliding
+from .outline import ENDLESS, Segments
+
+PER_CELL = 2.0
+"""Points of a surface per side of a cell."""
+
+ROWS = 2.0
+"""Cells behind a piece along the grid in which nodes act: no point gets deeper."""
+
+BEYOND = 0.0
+"""Cells that a piece goes on in another body that it meets."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """C places of contact of all bodies."""
+
+    position: NDArray[np.float64]
+    """[C, 2] at t = 0 [m]."""
+    first: NDArray[np.int32]
+    """[C] lowest of the 3 x 3 nodes, counted through; -1 where it follows from the position in every step."""
+    weight_x: NDArray[np.float64]
+    """[C, 3]"""
+    weight_y: NDArray[np.float64]
+    """[C, 3]"""
+    normal: NDArray[np.float64]
+    """[C, 2] out of the body."""
+    piece: NDArray[np.int32]
+    """[C] of the body's outline."""
+    body: NDArray[np.int32]
+    """[C]"""
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def chosen(self, which: NDArray[Any]) -> Places:
+        """Some of them, or all in another order."""
+        return Places(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    @staticmethod
+    def joined(parts: Sequence[Places]) -> Places:
+        return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
+
+
+def places_of(bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool]) -> Places:
+    """Places of contact of all bodies, in the order of the bodies and along their outlines.
+
+    Args:
+        bodies: all that the flow meets.
+        grid: on which they act.
+        passing: of each body whether it moves relative to the grid.
+    """
+    found = []
+    for number, body in enumerate(bodies):
+        on_grid = np.zeros(len(body.outline.segments), dtype=bool)
+        if not passing[number]:
+            on_grid = _along_grid(body.outline.segments, grid)
+            if on_grid.any():
+                found.append(_pairs(body, number, grid, on_grid))
+        others = [b for k, b in enumerate(bodies) if k != number and not passing[number] and not passing[k]]
+        found.append(_points(body, number, grid, ~on_grid, others, passing[number]))
+    return Places.joined(found)
+
+
+def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool]) -> NDArray[np.bool_]:
+    """Which places are joined to others [C]: they share a node with one, or may come to do so, or their body slides."""
+    if any(passing):
+        return np.ones(len(places), dtype=bool)
+    spacing = grid.spacing
+    first = places.first.astype(np.int64)
+    free = first < 0
+    i = np.floor((places.position[:, 0] - grid.left) / spacing).astype(np.int64) - 1
+    j = np.floor((places.position[:, 1] - grid.bottom) / spacing).astype(np.int64) - 1
+    first = np.where(free, i * grid.rows + j, first)
+    offset = (np.arange(3)[:, None] * grid.rows + np.arange(3)[None, :]).ravel()
+    acts = (places.weight_x[:, :, None] * places.weight_y[:, None, :]).reshape(-1, 9) != 0.0
+    acts[free] = True
+    node = first[:, None] + offset
+    inside = acts & (node >= 0) & (node < grid.columns * grid.rows)
+    count = np.bincount(node[inside], minlength=grid.columns * grid.rows)
+    shared = (inside & (count[np.clip(node, 0, len(count) - 1)] > 1)).any(axis=1)
+    slides = np.array([isinstance(body.motion, Sliding) for body in bodies])
+    return shared | slides[places.body] | free
+
+
+def _along_grid(pieces: Segments, grid: GridLayout) -> NDArray[np.bool_]:
+    """Pieces [G] that lie along a line of cell corners."""
+    straight = np.abs(np.abs(pieces.normal).sum(axis=1) - 1.0) < 1e-12
+    origin = np.abs(pieces.normal) @ np.array([grid.left, grid.bottom])
+    cells = (pieces.offset * pieces.normal.sum(axis=1) - origin) / grid.spacing
+    return straight & (np.abs(cells - np.round(cells)) < 1e-6)
+
+
+def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]) -> Places:
+    """Mirrored pairs of nodes at the pieces along the grid, and the nodes a row further back."""
+    x, y = grid.node_positions()
+    place = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    distance, _, nearest = body.outline.segments.nearest(place.reshape(-1, 2))
+    distance = (distance / grid.spacing).reshape(place.shape[:2])
+    nearest = nearest.reshape(place.shape[:2])
+    node = np.argwhere((distance < 0.0) & (distance > -ROWS) & on_grid[nearest])
+    at = (node[:, 0], node[:, 1])
+    piece, normal = nearest[at], body.outline.segments.normal[nearest[at]]
+    step = np.rint(normal).astype(np.int64)
+    paired = distance[at] > -1.0
+    margin = ((node >= 1) & (node < (grid.columns - 2, grid.rows - 2))).all(axis=1)
+    node, piece, normal, step, paired = (a[margin] for a in (node, piece, normal, step, paired))
+    low = np.where(paired[:, None], np.minimum(node, node + step), node)
+    # The middle one of three is the node; with its mirror image, the first two or the last two.
+    along_x, along_y = paired & (step[:, 0] != 0), paired & (step[:, 1] != 0)
+    first = low - np.stack([~along_x, ~along_y], axis=1)
+    single, double = np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 0.0])
+    return Places(
+        place[node[:, 0], node[:, 1]],
+        (first[:, 0] * grid.rows + first[:, 1]).astype(np.int32),
+        np.where(along_x[:, None], double, single),
+        np.where(along_y[:, None], double, single),
+        normal,
+        piece.astype(np.int32),
+        np.full(len(node), number, dtype=np.int32),
+    )
+
+
+def _points(
+    body: Body, number: int, grid: GridLayout, wanted: NDArray[np.bool_], others: Sequence[Body], passing: bool
+) -> Places:
+    """Points of the pieces that do not lie along the grid."""
+    pieces, spacing = body.outline.segments, grid.spacing
+    step = spacing / PER_CELL
+    low = np.array([grid.left, grid.bottom])
+    high = low + spacing * np.array([grid.columns, grid.rows])
+    reach = float((high - low).sum()) * (3.0 if passing else 1.0)
+    position, piece = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)]
+    for k in np.flatnonzero(wanted):
+        start, end = float(pieces.low[k]), float(pieces.high[k])
+        if end <= start:
+            continue
+        if start <= -ENDLESS and end >= ENDLESS:
+            middle = float((0.5 * (low + high) - pieces.begin[k]) @ pieces.along[k])
+            s = middle + (np.arange(-math.ceil(reach / step), math.ceil(reach / step)) + 0.5) * step
+        elif start <= -ENDLESS:
+            s = end - (np.arange(math.ceil(reach / step)) + 0.5)[::-1] * step
+        elif end >= ENDLESS:
+            s = start + (np.arange(math.ceil(reach / step)) + 0.5) * step
+        else:
+            count = math.ceil((end - start) / step - 1e-9)
+            s = start + (np.arange(count) + 0.5) * ((end - start) / count)
+        at = pieces.begin[k] + s[:, None] * pieces.along[k]
+        near = np.ones(len(at), dtype=bool)
+        if not passing:
+            near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
+            for other in others:
+                near &= other.outline.distance(at) > -BEYOND * spacing - 1e-9 * spacing
+        position.append(at[near])
+        piece.append(np.full(int(near.sum()), k, dtype=np.int32))
+    places, of = np.concatenate(position), np.concatenate(piece)
+    count = len(of)
+    return Places(
+        places,
+        np.full(count, -1, dtype=np.int32),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        pieces.normal[of],
+        of,
+        np.full(count, number, dtype=np.int32),
+    )
+
+
+def by_block(places: Places, grid: GridLayout) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.int32]]:
+    """An order of the places by the block of the grid that holds their first node, those blocks, and where each one's
+    places begin."""
+    i, j = places.first // grid.rows, places.first % grid.rows
+    blocks = ((i + 1) // BLOCK) * (grid.rows // BLOCK) + (j + 1) // BLOCK
+    order = np.argsort(blocks, kind="stable")
+    block, start = np.unique(blocks[order], return_index=True)
+    return order, block.astype(np.int32), np.append(start, len(places)).astype(np.int32)
