@@ -141,6 +141,15 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         Rule("sliding", kind == "sliding", why_moves, fixed if kind == "sliding" else {}),
         Rule("driven", kind == "prescribed", why_moves, fixed if kind == "prescribed" else {}),
         Rule(
+            "joined",
+            barrier is not None or bool(edges),
+            ", ".join(solid[1 if ground is not None else 0 :]) + " beside the ground"
+            if ground is not None and len(solid) > 1
+            else ", ".join(solid) + " alone"
+            if solid
+            else "nothing solid is there",
+        ),
+        Rule(
             "passing",
             passing,
             "the grid rides with the barrier past the domain's walls"

@@ -49,6 +49,8 @@ class Effects:
     """Some body slides on its base: its velocity is found together with the contact."""
     driven: bool = False
     """Some body's velocity is given, as a table or from outside during the run."""
+    joined: bool = False
+    """Some places of contact share nodes, or act on a body that slides: their impulses are found together."""
     passing: bool = False
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
 
@@ -107,6 +109,7 @@ class Effects:
                 "friction",
                 "sliding",
                 "driven",
+                "joined",
                 "passing",
             )
             if getattr(self, name)

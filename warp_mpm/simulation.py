@@ -53,6 +53,9 @@ STATE_OF_BODIES = (
 )
 """Arrays of the bodies that change during a run."""
 
+LANES = 256
+"""Threads of the one block that shares the joined places of contact on a GPU, Warp's own size of a block."""
+
 STATE_OF_CONTACT = ("last", "solid", "liquid", "alone", "rubbed")
 """Arrays of the places of contact that change during a run and are not formed anew in every step."""
 
@@ -210,7 +213,8 @@ class Simulation:
             "parameters": self._parameters,
         }
         self._counts = {"one": 1, "workers": self._workers, "points": self.material_points}
-        self._counts["groups"] = len(self._contact_arrays["block"]) if self.bodies else 0
+        if self.effects.bodies:
+            self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -233,8 +237,11 @@ class Simulation:
         self._grid, self._grid_arrays = grid.structure, grid.arrays
         solid = body_arrays(self.bodies, effects, types, self.grid, scenario.gravity.vector, device=device)
         self._bodies, self._body_arrays = solid.structure, solid.arrays
-        contact = contact_arrays(self.bodies, effects, types, self.grid, device=device) if self.bodies else None
-        self._contact, self._contact_arrays = (contact.structure, contact.arrays) if contact else (None, {})
+        self._contact, self._contact_arrays = None, {}
+        if effects.bodies:
+            lanes = 1 if device.is_cpu else LANES
+            contact = contact_arrays(self.bodies, effects, types, self.grid, lanes=lanes, device=device)
+            self._contact, self._contact_arrays = contact.structure, contact.arrays
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
         self._clock = self._clock_arrays["clock"]

@@ -20,7 +20,7 @@ from warp_mpm.simulation import Simulation
 from warp_mpm.simulator.bodies import Body, Driven, Outline, Sliding, Surface
 from warp_mpm.simulator.bodies.arrays import effects_of
 from warp_mpm.simulator.bodies.kernels import make_body_functions
-from warp_mpm.simulator.bodies.nodes import contact_nodes
+from warp_mpm.simulator.bodies.places import coloured, places_of, sharing
 from warp_mpm.simulator.bodies.of_scene import scene_bodies
 from warp_mpm.validation.scenes import box, scene
 
@@ -125,17 +125,22 @@ def basin(formulation="dry", *, bodies=(), end_time=1.0, **options):
 
 
 def acting(simulation, name):
-    """Places of contact of a body now: node, mirror, surface, normal; by node."""
+    """Where the nodes and weights of a body's places of contact say that these lie, and where they lie, relative to the
+    grid; only those whose weights all count."""
     number = [body.name for body in simulation.bodies].index(name)
-    arrays = {field: array.numpy() for field, array in simulation._contacts[number].arrays.items()}
-    acts = arrays["surface"] >= 0
-    node = arrays["node"][acts]
-    order = np.lexsort(node.T[::-1])
-    return [values[acts][order] for values in (arrays["node"], arrays["mirror"], arrays["surface"], arrays["normal"])]
+    arrays = {field: array.numpy() for field, array in simulation._contact_arrays.items()}
+    mine = (arrays["body"] == number) & (arrays["first"] >= 0)
+    weight_x, weight_y = arrays["weight_x"][mine], arrays["weight_y"][mine]
+    whole = np.abs(weight_x.sum(axis=1) * weight_y.sum(axis=1) - 1.0) < 1e-14
+    grid = simulation.grid
+    first = np.stack(np.divmod(arrays["first"][mine], grid.rows), axis=1)
+    middle = np.stack([weight_x @ np.arange(3.0), weight_y @ np.arange(3.0)], axis=1)
+    told = [grid.left, grid.bottom] + grid.spacing * (first + 0.5 + middle)
+    return told[whole], arrays["position"][mine][whole]
 
 
-def test_a_body_that_passes_acts_where_one_at_rest_would():
-    """The kernel's rule against that in NumPy, for a pillar that has moved across the grid."""
+def test_a_body_that_passes_acts_at_its_outline():
+    """The splines' weights give back where a place lies, for a pillar that has moved across the grid."""
     pillar = Body("pillar", Outline(0.7 * CIRCLE + [0.0, 3.5]), motion=Driven((0.0,), ((3.0, -1.0),)))
     simulation = basin(bodies=[pillar])
     for time in (0.03, 0.2):
@@ -143,19 +148,14 @@ def test_a_body_that_passes_acts_where_one_at_rest_would():
         # As it lay at the begin of the last step.
         step = float(simulation._clock.numpy()[2])
         moved = np.array(simulation.body_displacement("pillar")) - step * np.array([3.0, -1.0])
-        there = replace(pillar, outline=Outline(pillar.outline.vertices + moved))
-        nodes = contact_nodes(there, simulation.grid)
-        order = np.lexsort(nodes.node.T[::-1])
-        node, mirror, surface, normal = acting(simulation, "pillar")
-        assert len(node) > 20
-        np.testing.assert_array_equal(node, nodes.node[order])
-        np.testing.assert_allclose(normal, nodes.normal[order], atol=1e-12)
-        assert (mirror == -1).all()
-        assert len(set(surface)) == 1
+        told, position = acting(simulation, "pillar")
+        assert len(told) > 20
+        np.testing.assert_allclose(told, position + moved, atol=1e-12)
+        np.testing.assert_allclose(pillar.outline.distance(told - moved), 0.0, atol=1e-12)
 
 
 def test_walls_stay_in_place_while_the_grid_rides(load_scene):
-    """Seen from a grid that rides with a barrier they move; each acts at the nearest line of cell corners."""
+    """Seen from a grid that rides with a barrier they move."""
     changes = {
         "barrier.motion": {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [2.0]},
         "numerics.spacing_m": 0.5,
@@ -166,17 +166,48 @@ def test_walls_stay_in_place_while_the_grid_rides(load_scene):
     step = float(simulation._clock.numpy()[2])
     shift = simulation.barrier_displacement - 2.0 * step
     assert shift > 0.5
-    grid = replace(simulation.grid, left=simulation.grid.left + shift)
-    for body in simulation.bodies:
-        if body.edge:
-            nodes = contact_nodes(body, grid)
-            order = np.lexsort(nodes.node.T[::-1])
-            node, mirror, _, normal = acting(simulation, body.name)
-            np.testing.assert_array_equal(node, nodes.node[order])
-            np.testing.assert_array_equal(mirror, nodes.mirror[order])
-            np.testing.assert_array_equal(normal, nodes.normal[order])
+    for name, x in (("left_wall", -25.0), ("right_wall", 20.0)):
+        told, _ = acting(simulation, name)
+        assert len(told) > 10
+        np.testing.assert_allclose(told[:, 0] + shift, x, atol=1e-12)
     sample = simulation.sample()
     assert abs(sample["momentum_residual_x"]) < 1e-9 * abs(sample["momentum_x"])
+
+
+@pytest.mark.parametrize("height", [0.0, 0.05])
+def test_places_of_one_colour_share_no_node(height):
+    """So that threads may do them at the same time; and those that stand alone share a node with none."""
+    bodies = [Body("pillar", Outline(0.7 * CIRCLE + [0.0, 3.1])),
+              Body("slope", Outline([[4.0, 2.0 + height], [-4.0, 5.0 + height]], closed=False))]  # fmt: skip
+    simulation = basin(bodies=bodies, domain={"left_m": -8.0, "right_m": 8.0, "top_m": 6.0}, barrier=None)
+    passing = [False] * len(simulation.bodies)
+    places = places_of(simulation.bodies, simulation.grid, passing)
+    joined = sharing(places, simulation.bodies, simulation.grid, passing)
+    arrays = {field: array.numpy() for field, array in simulation._contact_arrays.items()}
+    simulation.advance(1e-3)
+    colour, count = arrays["colour"], len(places)
+    assert count == len(arrays["first"])
+    assert colour[0] == (~joined).sum()
+    assert colour[-1] == count
+    order, begin = coloured(places.chosen(joined), simulation.bodies, simulation.grid, passing)
+    assert sorted(order) == list(range(joined.sum()))
+    np.testing.assert_array_equal(begin + colour[0], colour)
+    nodes = []
+    for e in range(count):
+        used = [
+            int(arrays["first"][e]) + k * simulation.grid.rows + m
+            for k in range(3)
+            for m in range(3)
+            if arrays["first"][e] >= 0 and arrays["weight_x"][e][k] * arrays["weight_y"][e][m] > 0.0
+        ]
+        nodes.append(set(used))
+    for first, last in pairwise(colour):
+        used = [node for e in range(first, last) for node in nodes[e]]
+        assert len(used) == len(set(used))
+    others = set().union(*nodes[colour[0] :])
+    alone = [node for e in range(colour[0]) for node in nodes[e]]
+    assert len(alone) == len(set(alone))
+    assert others.isdisjoint(alone)
 
 
 # -- several bodies ----------------------------------------------------------------------------------------------

@@ -120,7 +120,7 @@ def test_what_base_friction_holds_is_a_fixed_barrier(load_scene):
     for simulation in (held, fixed):
         simulation.advance(1.0)
     assert held.barrier_displacement == 0.0
-    np.testing.assert_allclose(held.points()["position"], fixed.points()["position"], atol=1e-10)
+    np.testing.assert_allclose(held.points()["position"], fixed.points()["position"], atol=1e-8)  # two compiled codes
 
 
 @pytest.mark.parametrize("force", [float("nan"), float("inf"), -float("inf"), 1e300, -1.1e15])

@@ -23,10 +23,9 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     ]
     if effects.bodies:
         seen = ("contact", "bodies", *grid)
-        step += [
-            Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another"),
-            Launch("join", "one", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide"),
-        ]
+        step.append(Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another"))
+    if effects.joined:
+        step.append(Launch("join", "lanes", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide"))
     if effects.two_phase:
         seen = ("grid", "parameters", "balance")
         step.append(Launch("seep", "workers", seen, "rate at which gravity works on liquid that seeps"))

@@ -16,7 +16,7 @@ from warp_mpm.effects import Effects
 from warp_mpm.grid import GridLayout
 
 from .body import Body, Driven, Sliding
-from .places import Places, by_block, places_of, sharing
+from .places import Places, by_block, coloured, neighbours, places_of, sharing
 from .outline import ENDLESS
 
 
@@ -74,13 +74,21 @@ def passes(body: Body, bodies: Sequence[Body]) -> bool:
 
 def effects_of(bodies: Sequence[Body]) -> dict[str, bool]:
     """Those fields of `Effects` that the bodies decide."""
+    ground_alone = len(bodies) == 1 and _is_level_ground(bodies[0])
     return {
         "bodies": len(bodies) > 0,
         "friction": any(body.rubs for body in bodies),
         "sliding": any(isinstance(body.motion, Sliding) for body in bodies),
         "driven": any(isinstance(body.motion, Driven) for body in bodies),
+        "joined": len(bodies) > 0 and not ground_alone,
         "passing": any(passes(body, bodies) for body in bodies),
     }
+
+
+def _is_level_ground(body: Body) -> bool:
+    """Whether all its places of contact stand alone: it lies along y = 0, a line of cell corners, and rests."""
+    pieces = body.outline.segments
+    return len(pieces) == 1 and not body.moves and bool(pieces.normal[0, 1] == 1.0 and pieces.offset[0] == 0.0)
 
 
 def body_arrays(
@@ -132,18 +140,23 @@ def body_arrays(
 
 
 def contact_arrays(
-    bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
+    bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, lanes: int, device: Any
 ) -> Group:
-    """Where the bodies act, and what they give there in a step."""
+    """Where the bodies act, and what they give there in a step.
+
+    Args:
+        lanes: threads that share the joined places; see `places.coloured`.
+    """
     passing = [passes(body, bodies) for body in bodies]
     places = places_of(bodies, grid, passing)
     joined = sharing(places, bodies, grid, passing)
     order, block, start = by_block(places.chosen(~joined), grid)
-    places = Places.joined([places.chosen(~joined).chosen(order), places.chosen(joined)])
+    alone, together = places.chosen(~joined).chosen(order), places.chosen(joined)
+    order, colour = coloured(together, bodies, grid, passing)
+    places = Places.together([alone, together.chosen(order)])
     first = _firsts([len(body.surfaces) for body in bodies])
     surface_of = [np.array(body.surface_of_piece, dtype=np.int32) + first[k] for k, body in enumerate(bodies)]
     given = {
-        "alone_count": int((~joined).sum()),
         "body": places.body,
         "surface": np.array([surface_of[b][p] for b, p in zip(places.body, places.piece, strict=True)], dtype=np.int32),
         "position": places.position,
@@ -155,14 +168,20 @@ def contact_arrays(
         "block": block,
         "start": start,
     }
+    if effects.joined:
+        slides = np.array([isinstance(body.motion, Sliding) for body in bodies])[together.chosen(order).body]
+        abreast = [slides[a:b].sum() for a, b in zip(colour, colour[1:], strict=False)]
+        given |= {"colours": len(colour) - 1, "colour": colour + len(alone), "lanes": lanes}
+        given["abreast"] = float(max(abreast, default=1))
     if effects.friction:
-        number = np.arange(len(places), dtype=np.int32)
-        along = (places.first[:-1] < 0) & (places.body[:-1] == places.body[1:]) & (places.piece[:-1] == places.piece[1:])
-        along &= places.first[1:] < 0
-        given["before"] = number - np.append(False, along)
-        given["after"] = number + np.append(along, False)
-        given = {k: v.astype(np.int32) if k in ("before", "after") else v for k, v in given.items()}
-    shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1}
+        before, after = neighbours(together)
+        rank = np.argsort(order)  # where each place has come to
+        own = np.arange(len(alone))
+        given |= {
+            name: np.concatenate([own, len(alone) + rank[beside[order]]]).astype(np.int32)
+            for name, beside in (("before", before), ("after", after))
+        }
+    shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1, "more": 1}
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 

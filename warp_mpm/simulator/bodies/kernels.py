@@ -59,10 +59,12 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
             "external_force",  # [B] along x [N/m]
             "base_impulse",  # [B] of friction at the base, positive when it acts downstream [N s/m]
             "base_work",  # [B] that friction at the base has taken [J/m]
-            "held",  # [B] impulse of friction at the base in the step [N s/m]
-            "pressed",  # [B] of the flow along y in the step [N s/m]
+            "held",  # [B] impulse of friction at the base along x, in the step [N s/m]
+            "pressed",  # [B] of the flow along y, in the step [N s/m]
+            "guess",  # [B] velocity after the last sweep [m/s]
         ):
             fields[name] = array(dtype=wp.float64)
+        fields["pushed"] = array(dtype=wp.vec2d)  # [B] impulse of the flow that the velocity does not know yet [N s/m]
     if effects.driven:
         fields["first_time"] = array(dtype=wp.int32)  # [B + 1] where each body's table begins; empty: not driven
         fields["times"] = array(dtype=wp.float64)
@@ -74,7 +76,6 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
     """Fields of the structure `Contact`: C places of contact of all bodies, first those that stand alone."""
     array = wp.array
     fields: dict[str, Any] = {
-        "alone_count": wp.int32,
         "body": array(dtype=wp.int32),
         "surface": array(dtype=wp.int32),
         "position": array(dtype=V2),  # at t = 0 [m]
@@ -84,12 +85,19 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
         "weight_x": array(dtype=V3),
         "weight_y": array(dtype=V3),
         "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
-        "active": array(dtype=wp.int32),  # those of the joined places where something is
-        "last": array(dtype=wp.float64),  # time step of the impulses [s]
         "solid": array(dtype=scalar),  # impulses of the step [N s/m]: on the solid along the normal,
         "block": array(dtype=wp.int32),  # [groups] of those that stand alone
         "start": array(dtype=wp.int32),  # [groups + 1]
     }
+    if effects.joined:
+        fields |= {
+            "colours": wp.int32,  # of joined places; those of one colour share no node
+            "colour": array(dtype=wp.int32),  # [colours + 1] where each begins
+            "lanes": wp.int32,  # threads that share the places of a colour
+            "abreast": scalar,  # places of one colour on a body that slides, at most
+            "last": array(dtype=wp.float64),  # [1] time step of the impulses [s]
+            "more": array(dtype=wp.int32),  # [1] 1: another sweep is needed
+        }
     if effects.two_phase:
         fields["liquid"] = array(dtype=scalar)  # on the liquid,
     if effects.friction:

@@ -7,8 +7,8 @@ A piece of outline along a line of cell corners acts on mirrored pairs of nodes,
 the surface itself, and on the nodes a row further back, one by one. Any other acts at points of the surface, with the
 splines' own weights, two to a cell.
 
-Most pairs share no node with another place: each is done on its own. Where places share nodes, at an inclined face, in
-a corner, and wherever a body slides, they are joined: their impulses are found together.
+Most pairs on level ground share no node with another place: each is done on its own. Where places share nodes, at an
+inclined face and in a corner, and where their body slides, they are joined: their impulses are found together.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from warp_mpm.grid import GridLayout
 from warp_mpm.kernels.layout import BLOCK
 
-from .body import Body, Sliding
+from .body import Body, Driven, Sliding
 from .outline import ENDLESS, Segments
 
 PER_CELL = 2.0
@@ -32,9 +32,6 @@ PER_CELL = 2.0
 
 ROWS = 2.0
 """Cells behind a piece along the grid in which nodes act: no point gets deeper."""
-
-BEYOND = 0.0
-"""Cells that a piece goes on in another body that it meets."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ class Places:
         return Places(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     @staticmethod
-    def joined(parts: Sequence[Places]) -> Places:
+    def together(parts: Sequence[Places]) -> Places:
         return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
 
 
@@ -85,11 +82,12 @@ def places_of(bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool])
                 found.append(_pairs(body, number, grid, on_grid))
         others = [b for k, b in enumerate(bodies) if k != number and not passing[number] and not passing[k]]
         found.append(_points(body, number, grid, ~on_grid, others, passing[number]))
-    return Places.joined(found)
+    return Places.together(found)
 
 
 def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool]) -> NDArray[np.bool_]:
-    """Which places are joined to others [C]: they share a node with one, or may come to do so, or their body slides."""
+    """Which places are joined to others [C]: they share a node with one, or may come to do so, or their body has corners
+    or slides."""
     if any(passing):
         return np.ones(len(places), dtype=bool)
     spacing = grid.spacing
@@ -105,8 +103,8 @@ def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: S
     inside = acts & (node >= 0) & (node < grid.columns * grid.rows)
     count = np.bincount(node[inside], minlength=grid.columns * grid.rows)
     shared = (inside & (count[np.clip(node, 0, len(count) - 1)] > 1)).any(axis=1)
-    slides = np.array([isinstance(body.motion, Sliding) for body in bodies])
-    return shared | slides[places.body] | free
+    whole = np.array([isinstance(body.motion, Sliding) or len(body.outline.segments) > 1 for body in bodies])
+    return shared | whole[places.body] | free
 
 
 def _along_grid(pieces: Segments, grid: GridLayout) -> NDArray[np.bool_]:
@@ -155,7 +153,8 @@ def _points(
     step = spacing / PER_CELL
     low = np.array([grid.left, grid.bottom])
     high = low + spacing * np.array([grid.columns, grid.rows])
-    reach = float((high - low).sum()) * (3.0 if passing else 1.0)
+    reach = float((high - low).sum())
+    sideways = not (isinstance(body.motion, Driven) and any(vy for _, vy in body.motion.velocities))
     position, piece = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)]
     for k in np.flatnonzero(wanted):
         start, end = float(pieces.low[k]), float(pieces.high[k])
@@ -172,11 +171,13 @@ def _points(
             count = math.ceil((end - start) / step - 1e-9)
             s = start + (np.arange(count) + 0.5) * ((end - start) / count)
         at = pieces.begin[k] + s[:, None] * pieces.along[k]
-        near = np.ones(len(at), dtype=bool)
-        if not passing:
-            near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
+        near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
+        if passing:
+            # Anywhere along x, and along y too where it moves that way.
+            near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
+        else:
             for other in others:
-                near &= other.outline.distance(at) > -BEYOND * spacing - 1e-9 * spacing
+                near &= other.outline.distance(at) > -1e-9 * spacing
         position.append(at[near])
         piece.append(np.full(int(near.sum()), k, dtype=np.int32))
     places, of = np.concatenate(position), np.concatenate(piece)
@@ -200,3 +201,32 @@ def by_block(places: Places, grid: GridLayout) -> tuple[NDArray[Any], NDArray[np
     order = np.argsort(blocks, kind="stable")
     block, start = np.unique(blocks[order], return_index=True)
     return order, block.astype(np.int32), np.append(start, len(places)).astype(np.int32)
+
+
+def neighbours(places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The places before and after each one along its piece [C]; itself at an end, and where it acts on a pair."""
+    number = np.arange(len(places))
+    free = places.first < 0
+    along = free[:-1] & free[1:] & (places.body[:-1] == places.body[1:]) & (places.piece[:-1] == places.piece[1:])
+    return number - np.append(False, along)[: len(places)], number + np.append(along, False)[: len(places)]
+
+
+def coloured(
+    places: Places, bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool]
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """An order of the places by colour, and where each colour begins in it: places of one colour share no node.
+
+    Each place takes the first colour that none before it has within three cells, or any place of a body that moves
+    relative to its own.
+    """
+    reach = 3.0 * grid.spacing * (1.0 - 1e-9)
+    colour = np.full(len(places), -1)
+    apart = np.array([k if passes else -1 for k, passes in enumerate(passing)])[places.body]
+    for e in range(len(places)):
+        near = (np.abs(places.position[:e] - places.position[e]) < reach).all(axis=1) | (apart[:e] != apart[e])
+        taken = np.unique(colour[:e][near])
+        free = np.flatnonzero(taken != np.arange(len(taken)))
+        colour[e] = free[0] if len(free) else len(taken)
+    order = np.argsort(colour, kind="stable")
+    count = int(colour.max(initial=-1)) + 1
+    return order, np.searchsorted(colour[order], np.arange(count + 1)).astype(np.int32)
