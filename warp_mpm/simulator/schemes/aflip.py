@@ -8,19 +8,25 @@ from pydantic import Field
 from warp_mpm.schema import Model
 
 from .apic import Apic
-from .flip import Flip
+from .flip import Flip, make_gained
 
 
 class Settings(Model):
     transfer_damping: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    """With aflip: rate β at which a point's velocity is drawn to the nodes', per sound crossing of a cell [-]."""
+    """With aflip: rate β at which points are drawn to the nodes' velocity, per sound crossing of a cell [-]. The less,
+    the more noise is left: below 0.1 it may grow."""
 
 
 class Aflip(Flip):
-    """A point spreads its affine field, adds to its velocity what the nodes gained, and is drawn to the nodes' field.
+    """A point spreads its affine field, takes part in what the nodes gain, and is drawn to what they have.
 
-    v ← v + Δv_grid + β (c / d) Δt (v_grid - v - Δv_grid). Fei et al. give the last as a share of a step; here it is a
-    rate, with the speed of sound c and the spacing d: what is lost in a time does not depend on the steps in it.
+    With the nodes' velocity v_g and gain Δv_g, both at the point, and their first moments C_g and ΔC_g,
+
+        v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c / d) Δt.
+
+    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate β c / d, with
+    the speed of sound c and the spacing d: without it, velocity and affine field keep their energy, as both gain by the
+    transpose of what they give.
     """
 
     name = "aflip"
@@ -35,11 +41,11 @@ class Aflip(Flip):
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
 
-        F, V3, V = types.scalar, types.V3, types.V
+        F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
-        read, write, add = tools.read, tools.write, tools.add
-        flip = super().functions(types, tools)
-        flip_collect = flip["collect"]
+        read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
+        TWO_PHASE = types.effects.two_phase
+        gained = make_gained(types)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -58,6 +64,17 @@ class Aflip(Flip):
             add(grid.force, node, w * force + d * slope)
 
         @wp.func
+        def turning(xx: F, xy: F, yx: F, yy: F, time_step: F) -> V2:
+            """What a moved point's affine field C is to be divided by, and what is to be added to its trace's halves.
+
+            A field that rides along is C (I + Δt C)^-1 after the step: C rotating about the point turns the velocities
+            of the points around. So done for rotation and spreading; what squeezes is left to the nodes, as a point
+            that flies alone would steepen its own without bound.
+            """
+            rotation = time_step * larger(xx * yy - xy * yx, F(0.0))
+            return V2(F(1.0) + time_step * (larger(xx + yy, F(0.0)) + rotation), rotation)
+
+        @wp.func
         def collect(
             points: Points,
             p: wp.int32,
@@ -71,8 +88,45 @@ class Aflip(Flip):
             time_step: F,
             parameters: Parameters,
         ) -> V:
-            write(points.affine_x, p, lean_x * (F(4.0) * parameters.inverse_spacing))
-            write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
-            return flip_collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
+            place_x = wx[1] + F(2.0) * wx[2]
+            place_y = wy[1] + F(2.0) * wy[2]
+            to_x = V3(-place_x, F(1.0) - place_x, F(2.0) - place_x)
+            to_y = V3(-place_y, F(1.0) - place_y, F(2.0) - place_y)
+            increment = V()
+            gain_x = V()
+            gain_y = V()
+            for k in range(3):
+                along = V()
+                for m in range(3):
+                    part = wy[m] * read(grid.increment, first + k * parameters.rows + m)
+                    along += part
+                    gain_y += (wx[k] * to_y[m]) * part
+                increment += wx[k] * along
+                gain_x += (wx[k] * to_x[k]) * along
 
-        return flip | {"start": start, "column": column, "deposit": deposit, "collect": collect}
+            per_moment = F(4.0) * parameters.inverse_spacing
+            kept = F(1.0) - wp.min(parameters.pic_rate * time_step, F(1.0))
+            x = per_moment * lean_x + kept * (read(points.affine_x, p) + per_moment * (gain_x - lean_x))
+            y = per_moment * lean_y + kept * (read(points.affine_y, p) + per_moment * (gain_y - lean_y))
+            solid = turning(x[0], y[0], x[1], y[1], time_step)
+            if TWO_PHASE:
+                liquid = turning(x[2], y[2], x[3], y[3], time_step)
+                x = V((x[0] + solid[1]) / solid[0], x[1] / solid[0], (x[2] + liquid[1]) / liquid[0], x[3] / liquid[0])
+                y = V(y[0] / solid[0], (y[1] + solid[1]) / solid[0], y[2] / liquid[0], (y[3] + liquid[1]) / liquid[0])
+            else:
+                x = V((x[0] + solid[1]) / solid[0], x[1] / solid[0])
+                y = V(y[0] / solid[0], (y[1] + solid[1]) / solid[0])
+            write(points.affine_x, p, x)
+            write(points.affine_y, p, y)
+
+            new = gained(read(points.velocity, p), increment, smooth, time_step, parameters)
+            write(points.velocity, p, new)
+            write(points.advection, p, V2(smooth[0], smooth[1]))
+            return new
+
+        return super().functions(types, tools) | {
+            "start": start,
+            "column": column,
+            "deposit": deposit,
+            "collect": collect,
+        }
