@@ -7,8 +7,9 @@ from pydantic import Field
 
 from warp_mpm.schema import Model
 
-from .apic import Apic
+from .apic import Apic, affine_field
 from .flip import Flip, make_gained
+from .scheme import Array
 
 
 class Settings(Model):
@@ -24,9 +25,9 @@ class Aflip(Flip):
 
         v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c / d) Δt.
 
-    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate β c / d, with
-    the speed of sound c and the spacing d: without it, velocity and affine field keep their energy, as both gain by the
-    transpose of what they give.
+    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate β c / d,
+    with the speed of sound c and the spacing d: without it, velocity and affine field keep their energy, as both gain
+    by the transpose of what they give.
     """
 
     name = "aflip"
@@ -37,6 +38,9 @@ class Aflip(Flip):
 
     def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
         return {"pic_rate": numerics.transfer_damping * (sound_speed / numerics.spacing_m)}
+
+    def fitted(self, places: Array, spacing: float, masses: Array, velocities: Array) -> dict[str, Array]:
+        return affine_field(places, spacing, masses, velocities)
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
