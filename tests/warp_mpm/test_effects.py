@@ -31,7 +31,8 @@ POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
 """Floating-point numbers that a material point holds, by formulation."""
 
 NODE_NUMBERS = {"dry": 1 + 6 + 2 + 2, "undrained": 1 + 6 + 4 + 2 + 2, "two_phase": 1 + 12 + 5 + 2 + 2}
-"""And a node: mass, velocity, force and gain, corner sums, corner room (twice); friction needs to know what a liquid would do alone."""
+"""And a node: mass, velocity, force and gain, corner sums, corner room (twice); friction needs to know what a liquid
+would do alone."""
 
 LIQUID_WORDS = ("liquid", "pore", "pressure_residual", "drag", "surrounded", "cavitation", "relaxation")
 
