@@ -68,15 +68,23 @@ class Aflip(Flip):
             add(grid.force, node, w * force + d * slope)
 
         @wp.func
+        def line(w: V3, low: V, middle: V, high: V):
+            """Of a field at three nodes in a row: its weighted mean, and its first moment about the middle one."""
+            first = w[0] * low
+            last = w[2] * high
+            return first + w[1] * middle + last, last - first
+
+        @wp.func
         def turning(xx: F, xy: F, yx: F, yy: F, time_step: F) -> V2:
-            """What a moved point's affine field C is to be divided by, and what is to be added to its trace's halves.
+            """What a moved point's affine field C is multiplied by, and what is then added to xx and yy.
 
             A field that rides along is C (I + Δt C)^-1 after the step: C rotating about the point turns the velocities
             of the points around. So done for rotation and spreading; what squeezes is left to the nodes, as a point
             that flies alone would steepen its own without bound.
             """
             rotation = time_step * larger(xx * yy - xy * yx, F(0.0))
-            return V2(F(1.0) + time_step * (larger(xx + yy, F(0.0)) + rotation), rotation)
+            divided = F(1.0) / (F(1.0) + time_step * (larger(xx + yy, F(0.0)) + rotation))
+            return V2(divided, divided * rotation)
 
         @wp.func
         def collect(
@@ -92,21 +100,16 @@ class Aflip(Flip):
             time_step: F,
             parameters: Parameters,
         ) -> V:
-            place_x = wx[1] + F(2.0) * wx[2]
-            place_y = wy[1] + F(2.0) * wy[2]
-            to_x = V3(-place_x, F(1.0) - place_x, F(2.0) - place_x)
-            to_y = V3(-place_y, F(1.0) - place_y, F(2.0) - place_y)
-            increment = V()
-            gain_x = V()
-            gain_y = V()
-            for k in range(3):
-                along = V()
-                for m in range(3):
-                    part = wy[m] * read(grid.increment, first + k * parameters.rows + m)
-                    along += part
-                    gain_y += (wx[k] * to_y[m]) * part
-                increment += wx[k] * along
-                gain_x += (wx[k] * to_x[k]) * along
+            # Along each of the three columns of nodes first, then across; moments about the middle node first.
+            second = first + parameters.rows
+            third = second + parameters.rows
+            field = grid.increment
+            low, left_lean = line(wy, read(field, first), read(field, first + 1), read(field, first + 2))
+            middle, centre_lean = line(wy, read(field, second), read(field, second + 1), read(field, second + 2))
+            high, right_lean = line(wy, read(field, third), read(field, third + 1), read(field, third + 2))
+            increment, gain_x = line(wx, low, middle, high)
+            gain_x -= (wx[2] - wx[0]) * increment
+            gain_y = wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean - (wy[2] - wy[0]) * increment
 
             per_moment = F(4.0) * parameters.inverse_spacing
             kept = F(1.0) - wp.min(parameters.pic_rate * time_step, F(1.0))
@@ -115,11 +118,12 @@ class Aflip(Flip):
             solid = turning(x[0], y[0], x[1], y[1], time_step)
             if TWO_PHASE:
                 liquid = turning(x[2], y[2], x[3], y[3], time_step)
-                x = V((x[0] + solid[1]) / solid[0], x[1] / solid[0], (x[2] + liquid[1]) / liquid[0], x[3] / liquid[0])
-                y = V(y[0] / solid[0], (y[1] + solid[1]) / solid[0], y[2] / liquid[0], (y[3] + liquid[1]) / liquid[0])
+                share = V(solid[0], solid[0], liquid[0], liquid[0])
+                x = wp.cw_mul(share, x) + V(solid[1], F(0.0), liquid[1], F(0.0))
+                y = wp.cw_mul(share, y) + V(F(0.0), solid[1], F(0.0), liquid[1])
             else:
-                x = V((x[0] + solid[1]) / solid[0], x[1] / solid[0])
-                y = V(y[0] / solid[0], (y[1] + solid[1]) / solid[0])
+                x = solid[0] * x + V(solid[1], F(0.0))
+                y = solid[0] * y + V(F(0.0), solid[1])
             write(points.affine_x, p, x)
             write(points.affine_y, p, y)
 
