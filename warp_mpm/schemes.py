@@ -15,11 +15,12 @@ from warp_mpm.scenario.settings import Numerics
 from warp_mpm.schema import Model
 from warp_mpm.simulator.point_field import PointField
 from warp_mpm.simulator.schemes import SCHEMES, Scheme
+from warp_mpm.simulator.schemes.aflip import Aflip
 from warp_mpm.simulator.schemes.apic import Apic
 from warp_mpm.simulator.schemes.flip import Flip
 from warp_mpm.simulator.step import Launch
 
-__all__ = ["Apic", "Flip", "Launch", "Model", "PointField", "Scheme", "names", "register"]
+__all__ = ["Aflip", "Apic", "Flip", "Launch", "Model", "PointField", "Scheme", "names", "register"]
 
 
 def register(scheme: Scheme) -> None:

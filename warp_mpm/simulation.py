@@ -424,6 +424,11 @@ class Simulation:
             velocity = np.concatenate([velocity, now["liquid_velocity"]], axis=1)
         self._initial_momentum = momentum.tolist()
         self._point_arrays["velocity"].assign(velocity)
+        if not {"solid_velocity", "liquid_velocity"}.isdisjoint(state):
+            places = (now["position"] - [self._parameters.left, self._parameters.bottom]) / self.grid.spacing
+            fitted = self.effects.scheme.fitted(places, self.grid.spacing, solid + liquid, velocity)
+            for name, values in fitted.items():
+                self._point_arrays[name].assign(values)
         self._point_arrays["stress"].assign(now["effective_stress"])
         if self.effects.liquid:
             self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)

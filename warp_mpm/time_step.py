@@ -113,12 +113,12 @@ def lone_point_courant_number(poisson_ratio: float, scheme: Scheme, slopes: floa
     middle of a cell, 6 at its edge. Spread alike in both directions, with a = (c dt / d)^2 and
     r = (lambda + mu) / (lambda + 2 mu) = 1 / (2 (1 - nu)), stress s and rate of strain e of a step obey
 
-        apic: e' = e - 8 r a s, s' = s + e - 2 r a S s, stable up to a = 1 / (r (S - 2)), as the point keeps e,
+        apic, aflip: e' = e - 8 r a s, s' = s + e - 2 r a S s, stable up to a = 1 / (r (S - 2)), as the point keeps e,
         flip: s' = s - 2 r a S s,                       stable up to a = 1 / (r S), as it keeps its mean velocity alone.
 
     Args:
         poisson_ratio: 0.5 for a liquid.
-        scheme: apic, which keeps the point's affine field, or flip, which does not, or another of either kind.
+        scheme: apic or aflip, which keep the point's affine field, or flip, which does not, or another of either kind.
         slopes: S; the worst place by default.
     """
     kept = 2.0 if scheme.keeps_affine_field else 0.0

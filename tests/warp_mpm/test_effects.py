@@ -21,8 +21,8 @@ BARRIERS = {"sliding": ["collect", "slide", "push"], "fixed": ["press"]}
 
 POINT_NUMBERS = {
     "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
-            "gradient": 4, "affine_x": 2, "affine_y": 2, "solid_gap": 1, "viscous_pressure": 1, "crowding": 1,
-            "smooth": 2},
+            "gradient": 4, "affine_x": 2, "affine_y": 2, "advection": 2, "solid_gap": 1, "viscous_pressure": 1,
+            "crowding": 1, "smooth": 2},
 }  # fmt: skip
 POINT_NUMBERS["undrained"] = POINT_NUMBERS["dry"] | {"liquid_strain": 1, "pressure_residual": 1, "smooth": 4}
 POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
@@ -30,8 +30,9 @@ POINT_NUMBERS["two_phase"] = POINT_NUMBERS["undrained"] | {
 }  # fmt: skip
 """Floating-point numbers that a material point holds, by formulation."""
 
-NODE_NUMBERS = {"dry": 1 + 2 + 2 + 2, "undrained": 1 + 2 + 4 + 2 + 2, "two_phase": 1 + 4 + 5 + 2 + 2}
-"""And a node: mass, velocity, corner sums, corner room (twice); friction needs to know what a liquid would do alone."""
+NODE_NUMBERS = {"dry": 1 + 6 + 2 + 2, "undrained": 1 + 6 + 4 + 2 + 2, "two_phase": 1 + 12 + 5 + 2 + 2}
+"""And a node: mass, velocity, force and gain, corner sums, corner room (twice); friction needs to know what a liquid
+would do alone."""
 
 LIQUID_WORDS = ("liquid", "pore", "pressure_residual", "drag", "surrounded", "cavitation", "relaxation")
 
@@ -273,7 +274,7 @@ def test_endless_drag_is_undrained(load_scene):
     one = load_scene("case_1_undrained", **COARSE)
     two = load_scene("case_1", **COARSE | {"flow.material.hydraulic_conductivity_m_per_s": 1e-15})
     ratio = step_limits(one).sound_speed / step_limits(two).sound_speed
-    names = ("bulk_viscosity", "pressure_relaxation")
+    names = ("bulk_viscosity", "pressure_relaxation", "transfer_damping")
     scaled = {f"numerics.{name}": getattr(one.numerics, name) * ratio for name in names}
     runs = []
     for scenario in (one, two.replaced(scaled)):

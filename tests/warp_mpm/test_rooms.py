@@ -165,11 +165,11 @@ def test_a_stress_beside_the_remembered_one_acts_and_bounds_the_step():
     assert simulation.record["time_step_max"] <= limit * (1.0 + 1e-12)
 
 
-def test_a_scheme_of_a_script_loses_by_the_second_and_not_by_the_step():
+def test_a_scheme_of_a_script_runs():
     blended = script("blended_transfer")
     schemes.register(blended.Blend())
-    kept = {name: blended.energy_kept(name, 0.9) for name in ("apic", "flip", "blend")}
-    assert kept["blend"] > 0.97 > 0.95 > max(kept["apic"], kept["flip"])
+    kept = {name: blended.energy_kept(name, 0.9) for name in ("flip", "blend")}
+    assert kept["blend"] > 0.99 > 0.9 > kept["flip"]
 
 
 def test_fields_of_a_law_are_checked_and_in_the_schema(load_scene):
@@ -353,7 +353,7 @@ def test_what_cannot_be_registered():
     for scheme, words in ((Needy(), "must have a default"), (Doubled(), "courant_number, which numerics has")):
         with pytest.raises(ValueError, match=words):
             schemes.register(scheme)
-    assert schemes.names() == ("flip", "apic")
+    assert schemes.names() == ("flip", "apic", "aflip")
 
 
 def test_a_scheme_may_bring_kernels_of_its_own(load_scene):

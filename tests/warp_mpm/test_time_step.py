@@ -101,7 +101,8 @@ def test_limits_of_the_scenes(load_scene):
 
 
 def growth_of_a_lone_point(load_scene, transfer, place, step):
-    """By what factor the stress of one elastic point grows in 200 steps of c dt / d = `step`, from 1 Pa."""
+    """By what factor the stress of one elastic point grows in 200 steps of c dt / d = `step`, from 1 Pa, or
+    until it has grown enough."""
     corners = [[-2.0, 2.0], [-1.75, 2.0], [-1.75, 2.25], [-2.0, 2.25]]
     data = load_scene("case_1_dry").resolved()
     data |= {"barrier": None, "ground": None, "gravity": {"acceleration_m_per_s2": 0.0}}
@@ -119,11 +120,16 @@ def growth_of_a_lone_point(load_scene, transfer, place, step):
     simulation._parameters.wave_speed = sound  # the step of a full grid
     simulation._point_arrays["position"].assign(np.array([[-2.0 + 0.25 * place, 2.0 + 0.25 * place]]))
     simulation.set_points(effective_stress=np.array([[1.0, 1.0, 0.0, 0.0]]))
-    simulation.advance(200 * step * 0.25 / sound)
-    return np.abs(simulation.points()["effective_stress"]).max()
+    greatest = 0.0
+    for steps in range(10, 201, 10):
+        simulation.advance(steps * step * 0.25 / sound)
+        greatest = np.abs(simulation.points()["effective_stress"]).max()
+        if greatest > 1e4:  # and soon no number
+            break
+    return greatest
 
 
-@pytest.mark.parametrize("transfer", ["apic", "flip"])
+@pytest.mark.parametrize("transfer", ["apic", "aflip", "flip"])
 @pytest.mark.parametrize("place", [0.5, 0.7, 0.95])
 def test_limit_of_a_lone_point(load_scene, transfer, place):
     """Just below the limit that its place in the cell gives it does not grow, just above it does."""
@@ -140,7 +146,7 @@ def test_lone_points_count_where_there_is_tension(load_scene):
     plain = step_limits(load_scene("case_1_dry"))
     elastic = step_limits(load_scene("case_1_dry", **with_law(load_scene("case_1_dry"), "elastic")))
     cohesive = {"flow.material.cohesion_Pa": 1e4, "flow.material.tension_cutoff_Pa": 5e3}
-    alone = lone_point_courant_number(0.25, SCHEMES.named("apic"))
+    alone = lone_point_courant_number(0.25, SCHEMES.named("aflip"))
     assert elastic.wave_speed == pytest.approx(plain.wave_speed / alone, rel=1e-12)
     assert step_limits(load_scene("case_1_dry", **cohesive)) == elastic
     wet = step_limits(load_scene("case_1", **{"flow.material.cavitation_pressure_Pa": 1e5}))

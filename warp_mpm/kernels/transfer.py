@@ -17,6 +17,9 @@ from .layout import (
 EVEN = 0.1
 """Crowding up to which nothing is done: an even arrangement of points varies by that as it crosses the grid."""
 
+LEAST_HALF = 0.25
+"""Least volume, as a share, to which half a step takes a point: beyond, a step would turn it inside out."""
+
 
 def make_transfer(
     types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, bodies_of: Any, module: str
@@ -286,19 +289,34 @@ def make_transfer(
         if fastest > clock[wp.static(SPEED_MAX)]:
             wp.atomic_max(clock, wp.static(SPEED_MAX), fastest)
 
+        # The points move by v dt with the velocity that they have now, which is that of the middle of the step. Its
+        # gradient there is L (I + dt L / 2)^-1 of the gradient L at the places where the step began (Hughes and
+        # Winget 1980): volume and rotation are then those of the points' own motion, to second order.
+        half = F(0.5) * time_step
+        determinant = along_x[0] * along_y[1] - along_y[0] * along_x[1]
+        trace = along_x[0] + along_y[1]
+        ratio = F(1.0) / larger(F(1.0) + half * (trace + half * determinant), F(wp.static(LEAST_HALF)))
+        xx = ratio * (along_x[0] + half * determinant)
+        yy = ratio * (along_y[1] + half * determinant)
+        xy = ratio * along_y[0]
+        yx = ratio * along_x[1]
         # Gradient entries: dvx/dx, dvx/dy, dvy/dx, dvy/dy of the solid.
-        write(points.gradient, p, V4(along_x[0], along_y[0], along_x[1], along_y[1]))
-        divergence = along_x[0] + along_y[1]
+        write(points.gradient, p, V4(xx, xy, yx, yy))
+        divergence = xx + yy
         liquid_divergence = F(0.0)
         if TWO_PHASE:
-            liquid_divergence = along_x[2] + along_y[3]
+            # The liquid's own gradient, in the places to which the solid takes the points.
+            liquid_trace = along_x[2] + along_y[3]
+            product = along_x[0] * along_x[2] + along_y[0] * along_x[3] + along_x[1] * along_y[2]
+            product += along_y[1] * along_y[3]
+            liquid_divergence = ratio * (liquid_trace + half * (trace * liquid_trace - product))
         if OWN_DIVERGENCE:
             write(points.liquid_divergence, p, liquid_divergence)
         if DENSITY:
             # Beyond what a regular arrangement of points varies by, crowding counts as compression (of both phases), at
             # the rate of the shearing that brings it about; the corners' averages keep the pressures smooth.
-            stretch = along_x[0] - along_y[1]
-            shear = along_y[0] + along_x[1]
+            stretch = xx - yy
+            shear = xy + yx
             squeeze = (
                 parameters.density_correction
                 * wp.sqrt(stretch * stretch + shear * shear)

@@ -64,7 +64,7 @@ class Numerics(Model):
     """Material points in a full cell at t = 0."""
     courant_number: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Share of the critical time step that is used, C_NB."""
-    transfer: str = "apic"
+    transfer: str = "aflip"
     drag: Literal["semi_implicit", "explicit"] = "semi_implicit"
     """How the drag between the phases is integrated; explicit limits the time step at low conductivity."""
     volumetric_smoothing: bool = True

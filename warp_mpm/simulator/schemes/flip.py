@@ -16,6 +16,36 @@ class Settings(Model):
     """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
 
 
+def make_gained(types: SimpleNamespace) -> Any:
+    """Build the function `gained`, the velocity of a point that takes part in what the nodes gained."""
+    import warp as wp
+
+    F, V2, V, Parameters = types.scalar, types.V2, types.V, types.Parameters
+    TWO_PHASE = types.effects.two_phase
+
+    @wp.func
+    def gained(old: V, increment: V, smooth: V, time_step: F, parameters: Parameters) -> V:
+        """`increment` and `smooth` are what the nodes gained and their velocity, both at the point."""
+        pic = wp.min(parameters.pic_rate * time_step, F(1.0))
+        new = old + increment + pic * (smooth - old - increment)
+        if TWO_PHASE:
+            # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
+            decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
+            unseen = V2(
+                old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
+                old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
+            )
+            new = V(
+                new[0],
+                new[1],
+                new[0] + smooth[2] - smooth[0] + decay * unseen[0],
+                new[1] + smooth[3] - smooth[1] + decay * unseen[1],
+            )
+        return new
+
+    return gained
+
+
 class Flip(Scheme):
     """A point adds to its velocity what the nodes gained in the step, and moves with the nodes' velocity."""
 
@@ -35,7 +65,7 @@ class Flip(Scheme):
         F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add = tools.read, tools.write, tools.add
-        TWO_PHASE = types.effects.two_phase
+        gained = make_gained(types)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -94,22 +124,7 @@ class Flip(Scheme):
             for k in range(3):
                 for m in range(3):
                     increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
-            pic = wp.min(parameters.pic_rate * time_step, F(1.0))
-            old = read(points.velocity, p)
-            new = old + increment + pic * (smooth - old - increment)
-            if TWO_PHASE:
-                # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
-                decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
-                unseen = V2(
-                    old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
-                    old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
-                )
-                new = V(
-                    new[0],
-                    new[1],
-                    new[0] + smooth[2] - smooth[0] + decay * unseen[0],
-                    new[1] + smooth[3] - smooth[1] + decay * unseen[1],
-                )
+            new = gained(read(points.velocity, p), increment, smooth, time_step, parameters)
             write(points.velocity, p, new)
             write(points.advection, p, V2(smooth[0], smooth[1]))
             return new

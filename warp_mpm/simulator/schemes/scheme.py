@@ -4,10 +4,15 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warp_mpm.schema import Model
 
 from ..launch import Launch
 from ..point_field import PointField
+
+Array = NDArray[np.float64]
 
 
 class Scheme:
@@ -40,6 +45,17 @@ class Scheme:
         Args:
             numerics: of the scenario, with the fields of `settings`.
             sound_speed: in the material as a whole [m/s].
+        """
+        return {}
+
+    def fitted(self, places: Array, spacing: float, masses: Array, velocities: Array) -> dict[str, Array]:
+        """What its point fields must be where velocities of the points are given, by name (default: nothing).
+
+        Args:
+            places: of N points, in cells from the grid's lower left corner [N, 2].
+            spacing: of the grid [m].
+            masses: of the solid at the points [N] [kg/m].
+            velocities: of each phase [N, 2] or [N, 4] [m/s].
         """
         return {}
 

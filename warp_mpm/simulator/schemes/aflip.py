@@ -1,0 +1,140 @@
+"""Affine-augmented FLIP (Fei et al. 2021) for quadratic splines, with a loss that is given as a rate."""
+
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from warp_mpm.schema import Model
+
+from .apic import Apic, affine_field
+from .flip import Flip, make_gained
+from .scheme import Array
+
+
+class Settings(Model):
+    transfer_damping: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    """With aflip: rate β at which points are drawn to the nodes' velocity, per sound crossing of a cell [-]. The less,
+    the more noise is left: below 0.1 it may grow."""
+
+
+class Aflip(Flip):
+    """A point spreads its affine field, takes part in what the nodes gain, and is drawn to what they have.
+
+    With the nodes' velocity v_g and gain Δv_g, both at the point, and their first moments C_g and ΔC_g,
+
+        v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c / d) Δt.
+
+    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate β c / d,
+    with the speed of sound c and the spacing d: without it, velocity and affine field keep their energy, as both gain
+    by the transpose of what they give.
+    """
+
+    name = "aflip"
+    title = "affine-augmented FLIP (Fei et al. 2021), its loss a rate"
+    settings = Settings
+    point_fields = Flip.point_fields | Apic.point_fields
+    keeps_affine_field = True
+
+    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
+        return {"pic_rate": numerics.transfer_damping * (sound_speed / numerics.spacing_m)}
+
+    def fitted(self, places: Array, spacing: float, masses: Array, velocities: Array) -> dict[str, Array]:
+        return affine_field(places, spacing, masses, velocities)
+
+    def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
+        import warp as wp
+
+        F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
+        Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
+        read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
+        TWO_PHASE = types.effects.two_phase
+        gained = make_gained(types)
+
+        @wp.func
+        def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
+            momentum = wp.cw_mul(masses, read(points.velocity, p))
+            change_x = parameters.spacing * wp.cw_mul(masses, read(points.affine_x, p))
+            change_y = parameters.spacing * wp.cw_mul(masses, read(points.affine_y, p))
+            return momentum, change_x, change_y
+
+        @wp.func
+        def column(w: F, d: F, to: F, momentum: V, force_x: V, change_x: V) -> V:
+            return w * momentum + (w * to) * change_x
+
+        @wp.func
+        def deposit(grid: Grid, node: wp.int32, w: F, d: F, to: F, column: V, change: V, force: V, slope: V):
+            add(grid.velocity, node, w * (column + to * change))
+            add(grid.force, node, w * force + d * slope)
+
+        @wp.func
+        def line(w: V3, low: V, middle: V, high: V):
+            """Of a field at three nodes in a row: its weighted mean, and its first moment about the middle one."""
+            first = w[0] * low
+            last = w[2] * high
+            return first + w[1] * middle + last, last - first
+
+        @wp.func
+        def turning(xx: F, xy: F, yx: F, yy: F, time_step: F) -> V2:
+            """What a moved point's affine field C is multiplied by, and what is then added to xx and yy.
+
+            A field that rides along is C (I + Δt C)^-1 after the step: C rotating about the point turns the velocities
+            of the points around. So done for rotation and spreading; what squeezes is left to the nodes, as a point
+            that flies alone would steepen its own without bound.
+            """
+            rotation = time_step * larger(xx * yy - xy * yx, F(0.0))
+            divided = F(1.0) / (F(1.0) + time_step * (larger(xx + yy, F(0.0)) + rotation))
+            return V2(divided, divided * rotation)
+
+        @wp.func
+        def collect(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            # Along each of the three columns of nodes first, then across; moments about the middle node first.
+            second = first + parameters.rows
+            third = second + parameters.rows
+            field = grid.increment
+            low, left_lean = line(wy, read(field, first), read(field, first + 1), read(field, first + 2))
+            middle, centre_lean = line(wy, read(field, second), read(field, second + 1), read(field, second + 2))
+            high, right_lean = line(wy, read(field, third), read(field, third + 1), read(field, third + 2))
+            increment, gain_x = line(wx, low, middle, high)
+            gain_x -= (wx[2] - wx[0]) * increment
+            gain_y = wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean - (wy[2] - wy[0]) * increment
+
+            per_moment = F(4.0) * parameters.inverse_spacing
+            kept = F(1.0) - wp.min(parameters.pic_rate * time_step, F(1.0))
+            x = per_moment * lean_x + kept * (read(points.affine_x, p) + per_moment * (gain_x - lean_x))
+            y = per_moment * lean_y + kept * (read(points.affine_y, p) + per_moment * (gain_y - lean_y))
+            solid = turning(x[0], y[0], x[1], y[1], time_step)
+            if TWO_PHASE:
+                liquid = turning(x[2], y[2], x[3], y[3], time_step)
+                share = V(solid[0], solid[0], liquid[0], liquid[0])
+                x = wp.cw_mul(share, x) + V(solid[1], F(0.0), liquid[1], F(0.0))
+                y = wp.cw_mul(share, y) + V(F(0.0), solid[1], F(0.0), liquid[1])
+            else:
+                x = solid[0] * x + V(solid[1], F(0.0))
+                y = solid[0] * y + V(F(0.0), solid[1])
+            write(points.affine_x, p, x)
+            write(points.affine_y, p, y)
+
+            new = gained(read(points.velocity, p), increment, smooth, time_step, parameters)
+            write(points.velocity, p, new)
+            write(points.advection, p, V2(smooth[0], smooth[1]))
+            return new
+
+        return super().functions(types, tools) | {
+            "start": start,
+            "column": column,
+            "deposit": deposit,
+            "collect": collect,
+        }
