@@ -158,7 +158,7 @@ class TestTwoDevices:
         chosen = [derive_effects(scene) for scene in two_devices.scenes(load_scene("case_1")).values()]
         seen = {name: {getattr(effects, name) for effects in chosen} for name in vars(chosen[0])}
         assert seen["formulation"] == {"dry", "undrained", "two_phase"}
-        assert seen["transfer"] == {"flip", "apic"}
+        assert seen["transfer"] == {"flip", "apic", "aflip"}
         assert seen["precision"] == {"float64", "float32"}
         for name in ("bodies", "friction", "sliding", "driven", "passing", "porosity_update"):
             assert True in seen[name], name

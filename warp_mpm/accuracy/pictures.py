@@ -26,7 +26,7 @@ LEAST_ERROR = 1e-4
 SHOWN_BELOW_DOUBT = 5.0
 """How far the panels go on below what the reference is known to; what is less is drawn on the lower edge."""
 
-MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^v<>H1x", strict=True))
+MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^2v<>H1x", strict=True))
 """One for each knob: its points are told apart although there are fewer colours than knobs."""
 
 FORMULA_MARKERS = "*PXphd8"

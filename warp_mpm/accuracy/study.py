@@ -28,7 +28,8 @@ QUICK_KNOB_SPACING, FULL_KNOB_SPACING = 1.5, 1.0
 KNOBS: Mapping[str, tuple[Any, ...]] = {
     "points_per_cell": (1, 4, 9, 16),
     "courant_number": (0.25, 0.5, 0.95),
-    "transfer": ("apic", "flip"),
+    "transfer": ("aflip", "apic", "flip"),
+    "transfer_damping": (0.1, 0.2, 0.4),
     "drag": ("semi_implicit", "explicit"),
     "volumetric_smoothing": (True, False),
     "pressure_relaxation": (0.0, 1.0, 2.0),

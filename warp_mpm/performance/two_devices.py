@@ -47,7 +47,7 @@ FIGURES = ("force", "impulse", "displacement", "kinetic energy")
 
 
 def scenes(base: Scenario) -> dict[str, Scenario]:
-    """Six scenes that between them launch every kernel: formulations, motions, friction, transfers, precisions.
+    """Seven scenes that between them launch every kernel: formulations, motions, friction, transfers, precisions.
 
     Args:
         base: a two-phase scene with a barrier that slides.
@@ -61,6 +61,7 @@ def scenes(base: Scenario) -> dict[str, Scenario]:
         "two-phase, single precision": coarse.replaced({"numerics.precision": "float32"}),
         "undrained, fixed": undrained.replaced({"barrier.motion": {"kind": "fixed"}}),
         "dry, rough ground": undrained.replaced(without_liquid(undrained)).replaced({"ground.friction": 0.3}),
+        "two-phase, APIC": coarse.replaced({"numerics.transfer": "apic"}),
         "two-phase, driven, FLIP": coarse.replaced({"barrier.motion": driven, "numerics.transfer": "flip"}),
         "porosity, walls, ceiling": coarse.replaced(
             {
