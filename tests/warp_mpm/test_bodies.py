@@ -1,7 +1,6 @@
 """Bodies: outlines, the contact rule, several of them at once, and those of a script."""
 
 import importlib.util
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,8 +19,8 @@ from warp_mpm.simulation import Simulation
 from warp_mpm.simulator.bodies import Body, Driven, Outline, Sliding, Surface
 from warp_mpm.simulator.bodies.arrays import effects_of
 from warp_mpm.simulator.bodies.kernels import make_body_functions
-from warp_mpm.simulator.bodies.places import coloured, places_of, sharing
 from warp_mpm.simulator.bodies.of_scene import scene_bodies
+from warp_mpm.simulator.bodies.places import coloured, places_of, sharing
 from warp_mpm.validation.scenes import box, scene
 
 FOLDER = Path(__file__).parents[2] / "scenarios"

@@ -128,8 +128,8 @@ CRITERIA = (
         "unconverged_share",
         1e-3,
         1e-3,
-        "share of steps in which the barrier's velocity was found neither to 1e-10 of its impulses nor to 1e-10 of "
-        "itself (1e-4 in single precision)",
+        "share of steps in which the last of forty sweeps still changed the barrier's velocity by more than a thousandth "
+        "of itself and of what its weight could give it in the step",
     ),
     Criterion(
         "halving_displacement",

@@ -25,8 +25,8 @@ SWEEPS = 4
 """Sweeps of a step. Two or forty change the sliding distance of the paper's case 1 by 0.1 %."""
 
 MOST = 40
-"""Sweeps where a body that slides still changes its velocity, as when it starts, stops, or is lighter than a cell of the
-flow."""
+"""Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
+the flow."""
 
 REACHED = 0.75
 """Share of a place's weights that must lie on nodes with mass before the flow counts as there. Between 0.6 and 0.9
@@ -38,7 +38,6 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     effects = types.effects
     F = types.scalar
     V2 = types.V2
-    V3 = types.V3
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
@@ -282,9 +281,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         return result
 
     @wp.func
-    def relax(
-        contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F
-    ):
+    def relax(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F):
         """Bring one place's impulses to what the velocities there now call for."""
         inverse = contact.inverse[e]
         n = contact.normal[e]

@@ -21,14 +21,21 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
         Launch("scatter", "points", points, "mass, momentum and internal force of the points to the nodes"),
         Launch("move", "workers", grid, "velocities of the nodes at the end of the step, drag included"),
     ]
+    seen = ("contact", "bodies", *grid)
     if effects.bodies:
-        seen = ("contact", "bodies", *grid)
-        step.append(Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another"))
+        step.append(
+            Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another")
+        )
     if effects.joined:
-        step.append(Launch("join", "lanes", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide"))
+        step.append(
+            Launch("join", "lanes", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide")
+        )
     if effects.two_phase:
-        seen = ("grid", "parameters", "balance")
-        step.append(Launch("seep", "workers", seen, "rate at which gravity works on liquid that seeps"))
+        step.append(
+            Launch(
+                "seep", "workers", ("grid", "parameters", "balance"), "rate at which gravity works on liquid that seeps"
+            )
+        )
     step.append(Launch("gather", "points", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))

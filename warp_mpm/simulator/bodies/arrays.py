@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,8 +16,8 @@ from warp_mpm.effects import Effects
 from warp_mpm.grid import GridLayout
 
 from .body import Body, Driven, Sliding
-from .places import Places, by_block, coloured, neighbours, places_of, sharing
 from .outline import ENDLESS
+from .places import Places, by_block, coloured, neighbours, places_of, sharing
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def contact_arrays(
     }
     if effects.joined:
         slides = np.array([isinstance(body.motion, Sliding) for body in bodies])[together.chosen(order).body]
-        abreast = [slides[a:b].sum() for a, b in zip(colour, colour[1:], strict=False)]
+        abreast = [slides[a:b].sum() for a, b in pairwise(colour)]
         given |= {"colours": len(colour) - 1, "colour": colour + len(alone), "lanes": lanes}
         given["abreast"] = float(max(abreast, default=1))
     if effects.friction:

@@ -229,4 +229,3 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
         look_ahead=look_ahead,
         set_back=set_back,
     )
-

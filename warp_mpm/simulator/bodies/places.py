@@ -86,8 +86,8 @@ def places_of(bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool])
 
 
 def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool]) -> NDArray[np.bool_]:
-    """Which places are joined to others [C]: they share a node with one, or may come to do so, or their body has corners
-    or slides."""
+    """Which places are joined to others [C]: they share a node with one, or may come to do so, or their body has
+    corners or slides."""
     if any(passing):
         return np.ones(len(places), dtype=bool)
     spacing = grid.spacing
@@ -128,7 +128,7 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
     step = np.rint(normal).astype(np.int64)
     paired = distance[at] > -1.0
     margin = ((node >= 1) & (node < (grid.columns - 2, grid.rows - 2))).all(axis=1)
-    node, piece, normal, step, paired = (a[margin] for a in (node, piece, normal, step, paired))
+    node, piece, normal, step, paired = node[margin], piece[margin], normal[margin], step[margin], paired[margin]
     low = np.where(paired[:, None], np.minimum(node, node + step), node)
     # The middle one of three is the node; with its mirror image, the first two or the last two.
     along_x, along_y = paired & (step[:, 0] != 0), paired & (step[:, 1] != 0)
