@@ -49,9 +49,10 @@ def test_the_ladder_adds_one_effect_at_a_time(load_scene):
     scenes = _ladder(load_scene("case_1").replaced(SHORT))
     rules = [{rule.effect: rule.value for rule in effect_rules(scene)} for _, scene in scenes]
     changed = [{name for name in after if after[name] != before[name]} for before, after in pairwise(rules)]
-    # The second phase brings the drag along. A barrier beside the ground, friction beside friction and a ceiling beside
-    # walls need more numbers and launches, and no other kernels; all others are one effect.
-    assert [len(names) for names in changed] == [1, 1, 1, 1, 0, 1, 1, 1, 1, 2, 1, 0, 1, 0]
+    # The second phase brings the drag along. Friction beside friction and a ceiling beside walls need more numbers, and
+    # no other kernels; all others are one effect.
+    assert [len(names) for names in changed] == [1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 1, 0, 1, 0]
+    assert changed[4] == {"joined"}
     assert changed[9] == {"formulation", "drag"}
     assert len(scenes) == 15
 

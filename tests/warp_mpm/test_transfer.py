@@ -79,7 +79,7 @@ class Bench:
 
     def launch(self, kernel):
         simulation = self.simulation
-        (launch,) = (one for one in launches(simulation.effects, simulation.bodies) if one.kernel == kernel)
+        (launch,) = (one for one in launches(simulation.effects) if one.kernel == kernel)
         arguments = [simulation._arguments[name] for name in launch.takes]
         simulation._launch(launch, simulation._counts[launch.over], arguments)
 

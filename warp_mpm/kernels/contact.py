@@ -24,7 +24,7 @@ from .layout import BARRIER_ITERATIONS, BARRIER_UNCONVERGED, TIME_STEP
 SWEEPS = 4
 """Sweeps of a step. Two or forty change the sliding distance of the paper's case 1 by 0.1 %."""
 
-MOST = 40
+MOST = 100
 """Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
 the flow."""
 
