@@ -128,8 +128,8 @@ CRITERIA = (
         "unconverged_share",
         1e-3,
         1e-3,
-        "share of steps in which the last of forty sweeps still changed the barrier's velocity by more than a thousandth "
-        "of itself and of what its weight could give it in the step",
+        "share of steps in which the last of forty sweeps still changed the barrier's velocity by more than a "
+        "thousandth of itself and of what its weight could give it in the step",
     ),
     Criterion(
         "halving_displacement",
