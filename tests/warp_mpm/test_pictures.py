@@ -1,5 +1,6 @@
 """Commands plot and animate: every kind, what the axes say, what the files hold, and what is refused."""
 
+import os
 import re
 from itertools import combinations
 
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from typer.testing import CliRunner
 
+from analytic.whole_file import UnwrittenError
 from warp_mpm import animation, plotting
 from warp_mpm.animation import write_film
 from warp_mpm.cli import app
@@ -279,6 +281,22 @@ def test_mp4_plays_as_long_as_it_should(runs, tmp_path):
     assert seen == list(range(7))
     assert frames == 7
     assert seconds == pytest.approx(7 * 0.2 / 0.5, abs=0.05)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no limits on files")
+def test_film_that_is_cut_off_is_not_called_done(runs, tmp_path):
+    """The encoder ends in silence where it may write no more."""
+    pytest.importorskip("imageio_ffmpeg")
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, before[1]))
+    try:
+        with pytest.raises(UnwrittenError, match=r"film.mp4 cannot be written: the encoder could not write all of it"):
+            write_film(Results.open(runs[0]), tmp_path / "film.mp4", width=400)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

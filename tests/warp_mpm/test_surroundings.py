@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import warp as wp
+import warp._src.build as warp_build
 from typer.testing import CliRunner
 
 import warp_mpm.cli
@@ -134,6 +135,22 @@ def test_broken_compiled_kernels_are_built_anew(kernel_cache, tmp_path, caplog, 
     kernel_cache()
     cache.load_kernels(MODULE, "cpu")
     assert len(caplog.messages) == 1
+
+
+def test_a_build_that_failed_is_tried_again(kernel_cache, monkeypatch, caplog):
+    """Warp remembers the failure, and would tell of it again."""
+    build, calls = warp_build.build_cpu, []
+
+    def build_cpu(*arguments, **options):
+        calls.append(None)
+        if len(calls) == 1:
+            raise RuntimeError("Out of space")
+        return build(*arguments, **options)
+
+    monkeypatch.setattr(warp_build, "build_cpu", build_cpu)
+    cache.load_kernels(MODULE, "cpu")
+    assert works()
+    assert len(calls) == 2
 
 
 def test_a_cache_that_takes_nothing_is_gone_round(kernel_cache, tmp_path, monkeypatch, caplog):
