@@ -211,6 +211,9 @@ def test_a_name_that_is_too_long_is_told(tmp_path, command, monkeypatch):
     answer = CliRunner().invoke(warp_mpm.cli.app, [*command.split(), "--out", str(tmp_path / ("a" * 300))])
     assert answer.exit_code == 2
     assert answer.stderr.count("\n") == 1 or command.startswith("sweep")  # that one has more to complain of
+    assert "File name too long" in answer.stderr
+    if command.startswith("run"):
+        assert answer.stderr.endswith("aaa cannot be used: File name too long; choose another folder with --out.\n")
     assert "Traceback" not in answer.stderr
     assert answer.exception is None or isinstance(answer.exception, SystemExit)
 
