@@ -107,12 +107,25 @@ def test_a_run_that_was_stopped_within_an_interval_goes_on_bit_for_bit(scenario,
 ENDS = [signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
 
 
+@pytest.fixture
+def unheard():
+    """What nobody hears fails the test, and does not end the process that runs it."""
+
+    def fail(number, frame):
+        raise AssertionError(f"nobody heard {signal.Signals(number).name}")
+
+    before = {number: signal.signal(number, fail) for number in ENDS if number != signal.SIGINT}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def send(number):
     os.kill(os.getpid(), number)
 
 
 @pytest.mark.parametrize("number", ENDS)
-def test_a_run_is_asked_to_stop_and_asked_twice_ends_at_once(number):
+def test_a_run_is_asked_to_stop_and_asked_twice_ends_at_once(unheard, number):
     before = [signal.getsignal(one) for one in ENDS]
     with StopOnSignal() as stop:
         assert not stop.received
@@ -137,7 +150,7 @@ def test_what_nohup_has_ignored_stays_ignored():
 
 
 @pytest.mark.parametrize("number", ENDS)
-def test_any_command_tidies_up_before_it_ends(number, tmp_path):
+def test_any_command_tidies_up_before_it_ends(number, tmp_path, unheard):
     app = typer.Typer(cls=CommandLine)
     add_version(app)  # of one command alone Typer makes no group
 
@@ -176,7 +189,7 @@ def test_ctrl_c_while_kernels_are_compiled_leaves_nothing(load_scene, flying_poi
     assert {file: file.read_bytes() for file in (tmp_path / "run").iterdir()} == files
 
 
-def test_a_run_among_several_that_had_not_begun_is_told(tmp_path, monkeypatch):
+def test_a_run_among_several_that_had_not_begun_is_told(tmp_path, monkeypatch, unheard):
     def run_jobs(jobs, **calls):
         send(signal.SIGTERM)
         return [batch.JobEnd(jobs[0], -signal.SIGTERM, "")]
