@@ -114,7 +114,8 @@ def unheard():
     def fail(number, frame):
         raise AssertionError(f"nobody heard {signal.Signals(number).name}")
 
-    before = {number: signal.signal(number, fail) for number in ENDS if number != signal.SIGINT}
+    before = {number: signal.signal(number, fail) for number in ENDS}
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a process in the background does without
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
