@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -153,3 +154,22 @@ def _write_mp4(pictures: Iterator[np.ndarray], target: Path, rate: float) -> Non
             writer.send(np.ascontiguousarray(picture))
     finally:
         writer.close()
+    if not _is_whole_mp4(target):  # the encoder's own exit code is not told
+        raise OSError(errno.EIO, "the encoder could not write all of it; the disk may be full")
+
+
+def _is_whole_mp4(file: Path) -> bool:
+    """Whether its boxes (ISO/IEC 14496-12, 4.2) end where the file does, the index among them."""
+    names, place, size = set(), 0, file.stat().st_size
+    with file.open("rb") as stream:
+        while place < size:
+            stream.seek(place)
+            head = stream.read(16)
+            length = int.from_bytes(head[:4], "big")
+            if length == 1:
+                length = int.from_bytes(head[8:], "big")
+            if length < 8:
+                return False
+            names.add(head[4:8])
+            place += length
+    return place == size and b"moov" in names

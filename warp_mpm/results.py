@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -47,6 +47,27 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys((f"steps_limited_by_{limit}" for limit in ("wave", "drag", "output")), (int,)),
 }
 """What the entries of a run's record are, as far as anyone reads them."""
+
+SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
+    **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
+    "notes": (list,),
+    **dict.fromkeys(("definitions", "mechanism_measures"), (dict, NoneType)),
+    **dict.fromkeys(
+        ("end_time", "material_points", "steps", "wall_time", "time_step_min", "time_step_max", "peak_force",
+         "peak_force_time", "peak_force_filtered", "peak_force_filtered_time", "residual_force", "impact_start_time",
+         "impact_end_time", "rise_time", "impact_duration", "impulse", "impact_impulse", "pore_pressure_max",
+         "pore_pressure_max_time", "pore_pressure_max_anywhere", "pore_pressure_max_anywhere_time",
+         "barrier_velocity_max", "barrier_velocity_max_time", "barrier_displacement_final", "barrier_velocity_final",
+         "initial_volume", "left_volume", "retained_volume", "on_crest_volume", "overtopped_volume", "mass_error",
+         "momentum_error", "energy_error"),
+        (int, float, NoneType),
+    ),
+}  # fmt: skip
+"""The same of its summary."""
+
+PRECISIONS = ("float64", "float32")
+"""What `effects.precision` of a record may be."""
 
 _WORDS = {str: "a text", NoneType: "null", bool: "true or false", list: "a list", dict: "a group of fields"}
 
@@ -208,17 +229,13 @@ class Results:
         Raises:
             ResultsError: the file is missing or damaged, or an entry is of another kind than a run writes.
         """
-        record = self._json(run_folder.RECORD)
-        for name, kinds in RECORD_KINDS.items():
-            value = record.get(name)
-            right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
-            if name in record and not (right and (not isinstance(value, float) or math.isfinite(value))):
-                words = [_WORDS[kind] for kind in kinds if kind in _WORDS]
-                words += ["a number" if float in kinds else "a whole number"] if int in kinds else []
-                raise ResultsError(
-                    f"{self.path / run_folder.RECORD} is damaged: {name} = {json.dumps(value)[:80]} must be "
-                    f"{' or '.join(words)}."
-                )
+        record = self._json(run_folder.RECORD, RECORD_KINDS)
+        precision = record.get("effects", {}).get("precision", PRECISIONS[0])
+        if precision not in PRECISIONS:
+            raise ResultsError(
+                f"{self.path / run_folder.RECORD} is damaged: effects.precision = {json.dumps(precision)[:80]} must be "
+                f"{' or '.join(PRECISIONS)}."
+            )
         return record
 
     @cached_property
@@ -233,7 +250,7 @@ class Results:
                 f"{self.path / run_folder.SUMMARY} is missing: the run has not come to its end; to go on with it: "
                 f"python -m warp_mpm run --resume {self.path}"
             )
-        return self._json(run_folder.SUMMARY)
+        return self._json(run_folder.SUMMARY, SUMMARY_KINDS)
 
     @cached_property
     def time_series(self) -> dict[str, Array]:
@@ -312,7 +329,8 @@ class Results:
         """
         return Snapshots(self.path / run_folder.SNAPSHOTS)
 
-    def _json(self, name: str) -> dict[str, Any]:
+    def _json(self, name: str, entries: Mapping[str, tuple[type, ...]]) -> dict[str, Any]:
+        """A group of fields, and those of `entries` are of their kinds."""
         try:
             content = json.loads((self.path / name).read_text(encoding="utf-8"))
         except FileNotFoundError:
@@ -323,6 +341,15 @@ class Results:
             raise ResultsError(f"{self.path / name} cannot be read: {error}.") from None
         if not isinstance(content, dict):
             raise ResultsError(f"{self.path / name} does not hold a group of fields.")
+        for entry, kinds in entries.items():
+            value = content.get(entry)
+            right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
+            if entry in content and not (right and (not isinstance(value, float) or math.isfinite(value))):
+                words = [_WORDS[kind] for kind in kinds if kind in _WORDS]
+                words += ["a number" if float in kinds else "a whole number"] if int in kinds else []
+                raise ResultsError(
+                    f"{self.path / name} is damaged: {entry} = {json.dumps(value)[:80]} must be {' or '.join(words)}."
+                )
         return content
 
 
@@ -342,11 +369,11 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
     """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
 
     Raises:
-        ResultsError: the file is missing or damaged, or a number in it is not finite.
+        ResultsError: the file is missing or damaged, a number in it is not finite, or its time does not increase.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a spreadsheet that saved it puts a mark in front
     except FileNotFoundError:
         raise ResultsError(f"{path} is missing.") from None
     except OSError as error:
@@ -361,6 +388,12 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
     unknown = [label for label, key in keys.items() if key is None]
     if unknown:
         raise ResultsError(f"{path} has the column {unknown[0]!r}, which no run writes.")
+    names = [label.partition(" [")[0] for label in header]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ResultsError(f"{path} has the column {twice[0]!r} twice.")
+    if "time" not in names:
+        raise ResultsError(f"{path} has no column 'time [s]'.")
     values = np.empty((len(lines) - 1, len(header)))
     for number, line in enumerate(lines[1:]):
         cells = line.split(",")
@@ -370,10 +403,12 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
             values[number] = [float(cell) for cell in cells]
         except ValueError:
             raise ResultsError(f"{path} is damaged in line {number + 2}.") from None
-    names = [label.partition(" [")[0] for label in header]
     if not np.isfinite(values).all():
         line, column = np.argwhere(~np.isfinite(values))[0]
         raise ResultsError(
             f"{path} line {line + 2}: {names[column]} is {values[line, column]:g}, it must be a finite number."
         )
+    stalled = np.flatnonzero(np.diff(values[:, names.index("time")]) <= 0.0)
+    if stalled.size:
+        raise ResultsError(f"{path} line {stalled[0] + 3}: time does not increase.")
     return {name: values[:, column] for column, name in enumerate(names)}

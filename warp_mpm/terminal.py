@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -14,6 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from analytic.command_line import other_ends
 from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.description import described
 from warp_mpm.results import Results
@@ -28,14 +30,16 @@ PLAIN_LINES = 10
 
 
 class StopOnSignal:
-    """Ctrl-C and termination ask the run to stop after its present interval; a second Ctrl-C ends it at once."""
+    """Ctrl-C, termination and a terminal that is closed ask the run to stop after its present steps; a second Ctrl-C
+    ends it at once, and so does the first while nothing has been computed."""
 
     def __init__(self) -> None:
         self.received = False
+        self._nothing_to_lose = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, *other_ends()):
             self._before[number] = signal.signal(number, self._receive)
         return self
 
@@ -45,8 +49,17 @@ class StopOnSignal:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Around what may be broken off: kernels take half a minute to compile."""
+        self._nothing_to_lose = True
+        try:
+            yield
+        finally:
+            self._nothing_to_lose = False
+
     def _receive(self, number: int, frame: FrameType | None) -> None:
-        if self.received:
+        if self.received or self._nothing_to_lose:
             raise KeyboardInterrupt
         self.received = True
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -74,7 +76,7 @@ def run_settings(
         return found
     running: dict[Future[Result], Setting] = {}
     # Warp's state does not survive a fork.
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_parent)
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -101,6 +103,18 @@ def run_settings(
         for process in processes if running else []:
             process.terminate()
     return found
+
+
+def _end_with_parent() -> None:
+    """In a worker: end when the process that began it is gone, killed say; it would wait for work for ever."""
+
+    def watch() -> None:
+        parent = multiprocessing.parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def run_setting(scenario: dict[str, Any], path: str) -> Result:

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
+from signal import SIGTERM
 from typing import Any
 
 import typer
@@ -93,7 +94,10 @@ def run_several(
         )
     for end in ends:
         if end.code != 0:
-            complain(f"{end.job.name}: {end.message or f'ended with exit code {end.code}'}")
+            # Only before it has begun does a run end by the signal itself.
+            early = signal.received and end.code == -SIGTERM
+            said = "stopped before it had begun." if early else end.message or f"ended with exit code {end.code}"
+            complain(f"{end.job.name}: {said}")
     begun = sorted(
         (end for end in ends if end.code in (0, DIVERGED, INTERRUPTED)), key=lambda end: planned.index(end.job)
     )
