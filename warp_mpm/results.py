@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.extras import missing
-from warp_mpm.quantities import POINT_FIELDS, TIME_SERIES, time_series_quantity
+from warp_mpm.quantities import Quantity, quantity_of_column
+from warp_mpm.quantities.points import POINT_FIELDS, POSITION
 from warp_mpm.recording import run_folder
-from warp_mpm.recording.time_series import key_of
+from warp_mpm.recording.time_series import column_named
 from warp_mpm.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("problem", "git_commit"), (str, NoneType)),
     "git_changed": (bool, NoneType),
     **dict.fromkeys(("command", "resumed"), (list,)),
-    **dict.fromkeys(("effects", "versions"), (dict,)),
+    **dict.fromkeys(("effects", "versions", "quantities"), (dict,)),
     **dict.fromkeys(("preparation_time", "simulated_time", "wall_time"), (int, float)),
     **dict.fromkeys(("time_step_min", "time_step_max"), (int, float, NoneType)),
     **dict.fromkeys(("material_points", "steps", "points_left", "points_pushed_out", "voids_closed"), (int,)),
@@ -242,7 +243,34 @@ class Results:
         Raises:
             ResultsError: the file is missing or damaged.
         """
-        return read_time_series(self.path / run_folder.TIME_SERIES)
+        return read_time_series(self.path / run_folder.TIME_SERIES, self._own_quantities())
+
+    @cached_property
+    def quantities(self) -> dict[str, Quantity]:
+        """What the columns of the time series are, by name.
+
+        Raises:
+            ResultsError: the time series or the record is missing or damaged.
+        """
+        own = self._own_quantities()
+        found = {name: own.get(name) or quantity_of_column(name) for name in self.time_series}
+        return {name: quantity for name, quantity in found.items() if quantity is not None}
+
+    def _own_quantities(self) -> dict[str, Quantity]:
+        """Those that the script registered which made the run."""
+        if not (self.path / run_folder.RECORD).exists():
+            return {}
+        own = {}
+        for name, said in self.record.get("quantities", {}).items():
+            try:
+                unit, meaning, label, symbol = (str(said[part]) for part in ("unit", "meaning", "label", "symbol"))
+                own[name] = Quantity(name, unit, meaning, label, symbol)
+            except (KeyError, TypeError):
+                raise ResultsError(
+                    f"{self.path / run_folder.RECORD} is damaged: quantities.{name} = {json.dumps(said)[:80]} must be "
+                    "a group of unit, meaning, label and symbol."
+                ) from None
+        return own
 
     def frame(self) -> Any:
         """The time series as a pandas DataFrame, indexed by time [s]; `frame.attrs["units"]` has each column's unit and
@@ -255,12 +283,11 @@ class Results:
         pd = _optional("Results.frame()", "pandas")
 
         series = self.time_series
-        columns_known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
-        known = {name: columns_known.get(name) or time_series_quantity(name) for name in series}
+        known = self.quantities
         columns = {name: values for name, values in series.items() if name != "time"}
         frame = pd.DataFrame(columns, index=pd.Index(series["time"], name="time"))
-        frame.attrs["units"] = {name: quantity.unit for name, quantity in known.items() if quantity}
-        frame.attrs["meanings"] = {name: quantity.meaning for name, quantity in known.items() if quantity}
+        frame.attrs["units"] = {name: quantity.unit for name, quantity in known.items()}
+        frame.attrs["meanings"] = {name: quantity.meaning for name, quantity in known.items()}
         return frame
 
     def dataset(self) -> Any:
@@ -290,10 +317,9 @@ class Results:
         for name in ("position", *self.snapshots.names):
             arrays = [frame.position if name == "position" else frame[name] for frame in frames]
             width = arrays[0].shape[1] if arrays[0].ndim == 2 else 1
-            unit, meaning = (
-                ("m", "position") if name == "position" else (POINT_FIELDS[name].unit, POINT_FIELDS[name].meaning)
-            )
-            variables[name] = (("time", "point", *kinds[width]), stacked(arrays), {"units": unit, "long_name": meaning})
+            one = POINT_FIELDS.get(name, POSITION)
+            said = {"units": one.unit, "long_name": one.meaning}
+            variables[name] = (("time", "point", *kinds[width]), stacked(arrays), said)
         shifts = [np.nan if frame.barrier_displacement is None else frame.barrier_displacement for frame in frames]
         variables["barrier_displacement"] = ("time", shifts, {"units": "m", "long_name": "displacement of the barrier"})
         coordinates = {
@@ -338,8 +364,12 @@ def _optional(what: str, package: str) -> Any:
         raise ModuleNotFoundError(missing(what, package, "xarray"), name=package) from None
 
 
-def read_time_series(path: str | Path) -> dict[str, Array]:
+def read_time_series(path: str | Path, own: Mapping[str, Quantity] | None = None) -> dict[str, Array]:
     """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
+
+    Args:
+        path: of the file.
+        own: quantities that the run's script registered, by name.
 
     Raises:
         ResultsError: the file is missing or damaged, or a number in it is not finite.
@@ -357,8 +387,8 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
     if not lines:
         raise ResultsError(f"{path} is empty.")
     header = lines[0].split(",")
-    keys = {label: key_of(label) for label in header}
-    unknown = [label for label, key in keys.items() if key is None]
+    headings = {one.heading for one in (own or {}).values()}
+    unknown = [heading for heading in header if column_named(heading) is None and heading not in headings]
     if unknown:
         raise ResultsError(f"{path} has the column {unknown[0]!r}, which no run writes.")
     values = np.empty((len(lines) - 1, len(header)))

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 
 from warp_mpm.caveats import run_caveats, scene_caveats
+from warp_mpm.quantities import recorded_quantities
+from warp_mpm.quantities.time_series import OWN
 from warp_mpm.recording import (
     Checkpointer,
     Recorder,
@@ -28,7 +30,6 @@ from warp_mpm.recording import (
     run_folder,
 )
 from warp_mpm.recording.checkpoint import Checkpoint, versions
-from warp_mpm.recording.chosen import recorded_quantities
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.surfaces import write_surfaces
 from warp_mpm.results import Results, ResultsError
@@ -305,10 +306,18 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         "device": str(simulation.device),
         "material_points": simulation.material_points,
         **({"effects": asdict(simulation.effects)} if hasattr(simulation, "effects") else {}),
+        **_own_quantities(scenario),
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": used,
         **_commit(),
     }
+
+
+def _own_quantities(scenario: Scenario) -> dict[str, Any]:
+    """What a script says of the quantities that it registered, for whoever reads the run without it."""
+    said = ("unit", "meaning", "label", "symbol")
+    own = {name: {part: getattr(one, part) for part in said} for name, one in OWN.items() if one.there(scenario)}
+    return {"quantities": own} if own else {}
 
 
 def _commit() -> dict[str, Any]:
