@@ -11,7 +11,6 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -25,9 +24,11 @@ from numpy.typing import NDArray
 from warp_mpm.extras import missing
 from warp_mpm.quantities import Quantity, quantity_of_column
 from warp_mpm.quantities.points import POINT_FIELDS, POSITION
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.time_series import column_named
 from warp_mpm.scenario import Scenario
+from warp_mpm.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 
@@ -54,26 +55,6 @@ _WORDS = {str: "a text", NoneType: "null", bool: "true or false", list: "a list"
 
 class ResultsError(ValueError):
     """A run folder that cannot be read; the message names the file and what is wrong with it."""
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The material points at one time."""
-
-    time: float
-    """[s]."""
-    barrier_displacement: float | None
-    """[m]; None without a barrier."""
-    position: Array
-    """[N, 2] m."""
-    fields: dict[str, Array] = field(repr=False)
-    """Arrays with N rows in SI units: velocities [N, 2], effective_stress [N, 4] (xx, yy, zz, xy), others [N]."""
-
-    def __getitem__(self, name: str) -> Array:
-        return self.fields[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.fields
 
 
 class Snapshots:
@@ -321,7 +302,8 @@ class Results:
             said = {"units": one.unit, "long_name": one.meaning}
             variables[name] = (("time", "point", *kinds[width]), stacked(arrays), said)
         shifts = [np.nan if frame.barrier_displacement is None else frame.barrier_displacement for frame in frames]
-        variables["barrier_displacement"] = ("time", shifts, {"units": "m", "long_name": "displacement of the barrier"})
+        moved = NAMED["barrier_displacement"]
+        variables[moved.name] = ("time", shifts, {"units": moved.unit, "long_name": moved.meaning})
         coordinates = {
             "time": ("time", [frame.time for frame in frames], {"units": "s"}),
             "axis": ["x", "y"],

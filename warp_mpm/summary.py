@@ -23,6 +23,7 @@ from warp_mpm.quantities.figures import FIGURES, NEEDED
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import ResultsError, Snapshots
 from warp_mpm.scenario import Scenario, Sliding
+from warp_mpm.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
@@ -35,7 +36,7 @@ DEFINITIONS = {name: figure.meaning for name, figure in FIGURES.items()} | {
 
 
 def summarize(
-    scenario: Scenario, series: Series, snapshots: Snapshots | None, run: Mapping[str, Any]
+    scenario: Scenario, series: Series, snapshots: Sequence[Snapshot] | Snapshots | None, run: Mapping[str, Any]
 ) -> dict[str, Any]:
     """All key figures of a run that may have ended at any moment; one that the scene does not have, or that was not
     reached, is None.
