@@ -69,7 +69,7 @@ def test_recorder_of_a_script(tmp_path):
     assert table[:, 0] == pytest.approx([*np.arange(9) / 10, 0.85])  # the end too
     scene = Results.open(tmp_path / "run").scenario
     volume = scene.flow.volume
-    assert table[:, 1:].sum(axis=1) == pytest.approx(volume, rel=0.01)
+    assert table[:8, 1:].sum(axis=1) == pytest.approx(volume, rel=0.01)  # then some has passed the last strip
     assert table[0, 1:].max() == pytest.approx(scene.flow.depth, rel=0.01)
 
 
