@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from warp_mpm.cli import app
 from warp_mpm.plotting import comparison, force_and_displacement
 from warp_mpm.quantities import TIME_SERIES, Sampled, quantities_of, recorded_quantities, register
 from warp_mpm.quantities.figures import FIGURES, NEEDED
@@ -189,3 +191,19 @@ def test_what_a_record_says_of_own_quantities_is_checked(own, tmp_path):
     (folder / "run.json").write_text(json.dumps(record))
     with pytest.raises(ResultsError, match=r"has the column 'front \[m\]', which no run writes"):
         _ = Results.open(folder).time_series
+
+
+def test_command_lists_what_a_scene_records():
+    everything = CliRunner().invoke(app, ["quantities", "--json"])
+    assert {row["name"] for row in json.loads(everything.stdout)} == {one.name for one in TABLES} - set(DRAWN) | {
+        name for name in DRAWN if name in POINT_FIELDS
+    }
+    dry = CliRunner().invoke(app, ["quantities", str(ROOT / "scenarios/case_1_dry.json"), "--json"])
+    columns = [row["name"] for row in json.loads(dry.stdout) if row["file"] == "timeseries.csv"]
+    assert "impact_force_x" in columns
+    assert "liquid_mass" not in columns
+    plain = CliRunner().invoke(app, ["quantities"]).stdout
+    assert re.search(r"^  top_force \[N/m\] +force of the flow on the crest along x, F_3", plain, re.MULTILINE)
+    missing = CliRunner().invoke(app, ["quantities", "none.json"])
+    assert missing.exit_code == 2
+    assert "none.json" in missing.stderr

@@ -16,9 +16,10 @@ from collections.abc import Collection
 from typing import Any
 
 from .quantity import Quantity, Sampled
-from .time_series import OWN, TIME_SERIES, force_of_surface, quantity_of_column
+from .time_series import NAMED, OWN, TIME_SERIES, force_of_surface, quantity_of_column
 
 __all__ = [
+    "NAMED",
     "TIME_SERIES",
     "Quantity",
     "Sampled",
