@@ -30,7 +30,7 @@ test: lint
 
 # Functions that Warp compiles are left out: Python does not run them.
 coverage: $(VENV)/.test
-	rm -f build/coverage*
+	mkdir -p build && rm -f build/coverage*
 	$(BIN)/python -m coverage run -m pytest -n $(JOBS) --dist loadfile
 	$(BIN)/python -m coverage combine --quiet
 	$(BIN)/python -m coverage report --skip-covered --sort=cover
