@@ -15,9 +15,11 @@ from matplotlib.figure import Figure
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.whole_file import whole_file
 from warp_mpm.extras import missing
-from warp_mpm.fields import Field, colour_limits, field_named
+from warp_mpm.fields import colour_limits, field_named
 from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, in_lines, shown, window
-from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading
+from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading, symbol
+from warp_mpm.quantities.points import Drawn
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results, ResultsError
 
 FORMATS = ("mp4", "gif")
@@ -64,7 +66,7 @@ def write_film(
         write(_pictures(results, field, width, watch(range(0, len(snapshots), stride))), aside, rate)
 
 
-def _pictures(results: Results, field: Field, width: int, frames: Iterable[int]) -> Iterator[np.ndarray]:
+def _pictures(results: Results, field: Drawn, width: int, frames: Iterable[int]) -> Iterator[np.ndarray]:
     """RGB pictures [height, width, 3] of the snapshots."""
     scenario, snapshots = results.scenario, results.snapshots
     sparse = [snapshots[index] for index in np.unique(np.linspace(0, len(snapshots) - 1, 25).astype(int))]
@@ -113,14 +115,17 @@ def _draw_curves(panel: Any, results: Results) -> list[Any]:
     """Force and displacement against time; returns the line that marks the present."""
     series = results.time_series
     time = series["time"]
-    panel.plot(time, moving_mean(time, series["impact_force_x"]) / 1e3, color=BLUE)
+    force, moved = NAMED["impact_force_x"], NAMED["barrier_displacement"]
+    panel.plot(time, moving_mean(time, series[force.name]) * force.factor, color=BLUE)
     panel.set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
-    panel.set_ylabel(f"impact force $F_{{2,x}}$\n[kN/m], {FILTER_WINDOW:g} s mean", color=BLUE, fontsize=9)
+    panel.set_ylabel(
+        f"impact force {symbol(force)}\n[{force.shown_unit}], {FILTER_WINDOW:g} s mean", color=BLUE, fontsize=9
+    )
     grid(panel)
-    if np.any(series.get("barrier_displacement", 0.0)):
+    if np.any(series.get(moved.name, 0.0)):
         other = panel.twinx()
-        other.plot(time, series["barrier_displacement"], color=ORANGE, linestyle="--")
-        other.set_ylabel("barrier\ndisplacement [m]", color=ORANGE, fontsize=9)
+        other.plot(time, series[moved.name] * moved.factor, color=ORANGE, linestyle="--")
+        other.set_ylabel(f"barrier\ndisplacement [{moved.shown_unit}]", color=ORANGE, fontsize=9)
         other.set_ylim(bottom=0.0)
     return [panel.axvline(0.0, color=GREY)]
 

@@ -235,6 +235,7 @@ def test_a_record_of_the_wrong_kind_is_one_sentence(tmp_path, stopped, name, val
         ("mechanism", 3, "mechanism = 3 must be a text or null"),
         ("barrier_at_rest", 1, "barrier_at_rest = 1 must be true or false or null"),
         ("notes", "none", 'notes = "none" must be a list'),
+        ("front_max", "far", 'front_max = "far" must be null or a number'),  # of a script's quantity
     ],
 )
 def test_a_summary_of_the_wrong_kind_is_one_sentence(tmp_path, name, value, words):

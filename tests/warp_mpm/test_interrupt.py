@@ -214,12 +214,10 @@ def test_a_run_among_several_that_had_not_begun_is_told(tmp_path, monkeypatch, u
 def test_workers_end_with_the_process_that_began_them():
     """Killed, for want of memory say: they hold its standard output, which ends with the last of them."""
     code = (
-        "import multiprocessing, os, time; from concurrent.futures import ProcessPoolExecutor\n"
-        "from warp_mpm.accuracy.runner import _end_with_parent\n"
-        "spawn = multiprocessing.get_context('spawn')\n"
+        "import multiprocessing, time; from warp_mpm.engine import Processes, Task\n"
+        "def began(task): print(multiprocessing.active_children()[0].pid, flush=True)\n"
         "if __name__ == '__main__':\n"
-        "    pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_end_with_parent)\n"
-        "    print(pool.submit(os.getpid).result(), flush=True); time.sleep(60)\n"
+        "    list(Processes(1).run([Task('long', time.sleep, (60,))], on_start=began))\n"
     )
     with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
         worker = int(process.stdout.readline())

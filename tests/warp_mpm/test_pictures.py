@@ -195,8 +195,8 @@ def test_comparison_leaves_out_what_is_nil_in_all_runs(folder, load_scene, runs,
         return [panel.get_ylabel() for panel in plotting.comparison([Results.open(one) for one in paths]).axes]
 
     # The stand-in has no friction at the base and none on the crest.
-    assert [label.split()[0] for label in panels(path, path)] == ["impact,", "impact,", "kinetic"]
-    assert [label.split()[0] for label in panels(path, runs[0])] == ["impact,", "impact,", "barrier", "kinetic"]
+    assert [label.split()[0] for label in panels(path, path)] == ["horizontal", "vertical", "kinetic"]
+    assert [label.split()[0] for label in panels(path, runs[0])] == ["horizontal", "vertical", "barrier", "kinetic"]
 
 
 def test_times_beyond_the_end_are_told(runs, tmp_path):

@@ -128,6 +128,7 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
     from rich.table import Table
 
     from warp_mpm.caveats import told_of
+    from warp_mpm.quantities.figures import FIGURES
     from warp_mpm.terminal import AT_LEAST, sliding_distance
 
     console = Console(highlight=False, markup=False)
@@ -135,19 +136,19 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
         console.width = 160  # a file has no edge to fit to
     table = Table(box=box.SIMPLE_HEAD)
     words = ("run", "status", "mechanism")
-    figures = ("peak F₂ₓ, 0.05 s mean [kN/m]", "impulse [kN s/m]", "Δx [m]")
-    for heading in (*words[:2], *figures, words[2], "wall time [s]"):
+    figures = [FIGURES[name].column for name in ("peak_force_filtered", "impulse", "barrier_displacement_final")]
+    for heading in (*words[:2], *figures, words[2], FIGURES["wall_time"].column):
         table.add_column(heading, justify="left" if heading in words else "right")
     for folder, summary in summaries.items():
 
-        def cell(name: str, factor: float = 1.0, summary: dict[str, Any] = summary) -> str:
-            return "–" if summary.get(name) is None else f"{summary[name] * factor:,.4g}"
+        def cell(name: str, summary: dict[str, Any] = summary) -> str:
+            return "–" if summary.get(name) is None else f"{summary[name] * FIGURES[name].factor:,.4g}"
 
         table.add_row(
             folder,
             str(summary.get("status")),
-            cell("peak_force_filtered", 1e-3),
-            cell("impulse", 1e-3),
+            cell("peak_force_filtered"),
+            cell("impulse"),
             sliding_distance(summary),
             summary.get("mechanism") or "–",
             cell("wall_time"),
