@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol
@@ -96,7 +97,8 @@ class Processes:
                     process = context.Process(
                         target=_work, args=(theirs, task.function, task.arguments), name=task.name
                     )
-                    process.start()
+                    with _held_ctrl_c():
+                        process.start()
                     theirs.close()
                     running[ours] = task, process
                     on_start(task)
@@ -185,10 +187,28 @@ def dask_engine(workers: int, scheduler: str | None) -> Iterator[tuple[Dask, str
         yield Dask(client), getattr(client, "dashboard_link", "") or ""
 
 
+@contextmanager
+def _held_ctrl_c() -> Iterator[None]:
+    """Hear Ctrl-C only afterwards; a process that is begun meanwhile does not hear it before `_work`."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # whose start would let it through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _work(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Of a process: the task, and how it ended."""
     if hasattr(os, "setsid"):
-        os.setsid()  # Ctrl-C is for the process that began this one, which passes it on once
+        # Ctrl-C is for the process that began this one, which passes it on once.
+        os.setsid()
+        heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # drops one that came before
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, heard)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     result, problem = None, None
     try:

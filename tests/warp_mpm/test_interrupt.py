@@ -199,10 +199,13 @@ def test_ctrl_c_while_kernels_are_compiled_leaves_nothing(load_scene, flying_poi
     assert {file: file.read_bytes() for file in (tmp_path / "run").iterdir()} == files
 
 
-def test_a_run_among_several_that_had_not_begun_is_told(tmp_path, monkeypatch, unheard):
+@pytest.mark.parametrize(
+    ("code", "message"), [(-signal.SIGTERM, "the process died, for want of memory perhaps"), (130, "")]
+)
+def test_a_run_among_several_that_had_not_begun_is_told(tmp_path, monkeypatch, unheard, code, message):
     def run_jobs(jobs, **calls):
         send(signal.SIGTERM)
-        return [batch.JobEnd(jobs[0], -signal.SIGTERM, "")]
+        return [batch.JobEnd(jobs[0], code, message)]
 
     monkeypatch.setattr(batch, "run_jobs", run_jobs)
     scenes = [str(ROOT / "scenarios" / f"{name}.json") for name in ("case_1", "case_2")]
@@ -227,3 +230,36 @@ def test_workers_end_with_the_process_that_began_them():
         except subprocess.TimeoutExpired:
             os.kill(worker, signal.SIGKILL)
             pytest.fail("a worker outlived the process that began it")
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
+def test_ctrl_c_at_a_terminal_is_for_the_process_that_begins_workers():
+    """It goes to the whole group, of which a worker that starts still is one."""
+    code = (
+        "import os, signal; from warp_mpm.engine import Processes, Task\n"
+        "if __name__ == '__main__':\n"
+        "    signal.signal(signal.SIGINT, lambda *heard: print('heard'))\n"
+        "    began = lambda task: os.killpg(0, signal.SIGINT)\n"
+        "    print([one.result for one in Processes(1).run([Task('one', divmod, (7, 2))], on_start=began)])\n"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, start_new_session=True, check=True
+    )
+    assert (answer.stdout, answer.stderr) == ("heard\n[(3, 1)]\n", "")
+
+
+def test_a_run_among_several_whose_parent_was_killed_is_kept(tmp_path):
+    """It stops as if it had been asked to, with all that it has computed."""
+    code = (
+        "import os, signal, sys; from pathlib import Path; from warp_mpm.batch import Job, run_jobs\n"
+        "def look(job, time):\n"
+        "    if time > 0.0: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "if __name__ == '__main__':\n"
+        "    folder = sys.argv[1]\n"
+        "    options = ('--spacing', '1', '--until', '300', '--out', folder)\n"
+        "    run_jobs([Job('run', Path(folder), ('scenarios/case_1.json', *options), 300.0)], at_once=1,\n"
+        "             on_progress=look)\n"
+    )
+    # What it prints ends with the last process that holds it.
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "run")], cwd=ROOT, stdout=subprocess.PIPE, timeout=100)
+    assert Results.open(tmp_path / "run").summary["status"] == "stopped"

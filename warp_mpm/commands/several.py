@@ -94,8 +94,8 @@ def run_several(
         )
     for end in ends:
         if end.code != 0:
-            # Only before it has begun does a run end by the signal itself.
-            early = signal.received and end.code == -SIGTERM
+            # Only before it has begun does a run end by the signal itself, or without a word.
+            early = signal.received and (end.code == -SIGTERM or (end.code == INTERRUPTED and not end.message))
             said = "stopped before it had begun." if early else end.message or f"ended with exit code {end.code}"
             complain(f"{end.job.name}: {said}")
     begun = sorted(
