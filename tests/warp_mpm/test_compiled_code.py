@@ -64,8 +64,13 @@ def test_the_same_kernels_compile_for_a_gpu(load_scene, tmp_path, name, precisio
     text = code.read_text()
     parts = re.split(r"\.entry \w*__locals__(\w+)_[0-9a-f]{8}_cuda_kernel_forward", text)
     bodies = dict(zip(parts[1::2], parts[2::2], strict=True))
-    assert {"scatter", "move", "gather", "advect", "update", "bound", "tick", "slide"} <= set(bodies)
+    assert {"scatter", "move", "gather", "advect", "update", "bound", "tick", "press", "join"} <= set(bodies)
     assert set(bodies) <= set(kernels.__dict__)
+    # Joined places: after a colour, all threads wait before they take the next, which shares nodes with it. No other
+    # kernel has its threads wait for each other.
+    waiting = {kernel: len(re.findall(r"\bbar(?:rier)?\.(?:cta\.)?sync\b", text)) for kernel, text in bodies.items()}
+    assert waiting.pop("join") >= 9  # times that a barrier that slides makes them wait
+    assert set(waiting.values()) == {0}
     # Points that share a node or a corner add to it one after the other: every sum of theirs is atomic.
     values = 4 if effects.two_phase else 2
     corner = 5 if effects.two_phase else 2

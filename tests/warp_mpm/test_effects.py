@@ -17,7 +17,7 @@ SCENES = Path(__file__).parents[2] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENES.glob("*.json"))
 
 TRANSPORT = ["clear", "forget", "scatter", "move"]
-BARRIERS = {"sliding": ["collect", "slide", "push"], "fixed": ["press"]}
+CONTACT = ["press", "join"]
 
 POINT_NUMBERS = {
     "dry": {"position": 2, "velocity": 2, "stress": 4, "reference_volume": 1, "volume": 1, "deviatoric_strain": 1,
@@ -69,13 +69,11 @@ def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
     simulation = Simulation(scenario)
     simulation.advance(1e-4)
     # The shipped scenes are plastic, on smooth ground, with smoothing; they differ in flow and barrier.
-    ground, barrier = ["press"], BARRIERS[scenario.barrier.motion.kind]
     points = ["gather", "average", "advect", "update", "bound", "tick"]
     if flow.formulation == "two_phase":
         points = ["seep", *points]
-    assert noted["launched"] == ["start", *TRANSPORT, *ground, *barrier, *points]
-    contact = [*(f"{name} ground" for name in ground), *(f"{name} barrier" for name in barrier)]
-    assert simulation.launched_kernels == (*TRANSPORT, *contact, *points)
+    assert noted["launched"] == ["start", *TRANSPORT, *CONTACT, *points]
+    assert simulation.launched_kernels == (*TRANSPORT, *CONTACT, *points)
 
     arrays, number = simulation.arrays, simulation.material_points
     for field, count in POINT_NUMBERS[flow.formulation].items():
@@ -116,9 +114,7 @@ def test_generated_code_of_a_dry_scene_holds_no_liquid(load_scene):
     dry = generated_code(load_scene("case_1_dry", **changes))
     words = set(re.findall(r"[A-Za-z_]\w*", dry))
     found = {word for word in words if any(part in word for part in LIQUID_WORDS)}
-    # An argument that one function hands on; in a dry scene it is the constant zero and nothing reads it.
-    assert found <= {"var_liquid_free", "adj_liquid_free"}
-    assert len(re.findall(r"\bvar_liquid_free\b", dry)) <= 2  # in signatures, never in a statement
+    assert found == set()
     # The same search does find them where there is a liquid.
     wet = generated_code(load_scene("case_1", **changes))
     assert {"liquid_strain", "var_drag", "liquid_bulk_modulus"} & set(re.findall(r"[A-Za-z_]\w*", wet))
@@ -133,7 +129,7 @@ def test_generated_code_of_a_fixed_barrier_does_not_slide(load_scene):
         assert field in sliding
 
 
-FRICTION_WORDS = ("friction", "liquid_alone", "liquid_free")
+FRICTION_WORDS = ("friction", "liquid_alone", "rubbed")
 
 
 def friction_in(scenario):
@@ -157,35 +153,20 @@ def test_without_friction_nothing_of_it_is_there(load_scene, name):
     assert parameters == set()
     words = set(re.findall(r"[A-Za-z_]\w*", generated_code(smooth)))
     found = {word.replace("adj_", "var_") for word in words if any(part in word for part in FRICTION_WORDS)}
-    # Arguments that one function hands on, and what the barrier's base does.
-    assert found <= {"var_friction", "var_liquid_free", "base_friction", "var_base_friction"}
+    # What the barrier's base does.
+    assert found <= {"base_friction", "var_base_friction"}
     assert {"contact", "grid", "bodies"} <= {name.partition(".")[0] for name in friction_in(load_scene("case_1"))[0]}
 
 
 def test_friction_of_the_ground_alone(load_scene):
     changes = {"numerics.spacing_m": 0.5, "ground.friction": 0.3, "barrier.friction": 0.0}
     arrays, _ = friction_in(load_scene("case_1_fixed", **changes))
-    assert set(arrays) == {"grid.liquid_alone", "bodies.friction"}
+    assert set(arrays) == {"grid.liquid_alone", "contact.rubbed", "bodies.friction"}
     dry, _ = friction_in(load_scene("case_1_dry", **changes))
-    assert set(dry) == {"bodies.friction"} | BASE
+    assert set(dry) == {"contact.rubbed", "bodies.friction"} | BASE
 
 
-def test_one_surface_pays_for_itself_alone(load_scene):
-    """Friction on one surface of the barrier holds vectors at that surface's contacts, and at no others."""
-
-    def contacts(face, top, back):
-        friction = {"face": face, "top": top, "back": back}
-        scenario = load_scene("case_1", **{"numerics.spacing_m": 0.5, "barrier.friction": friction})
-        return friction_in(scenario)[0]["contact.barrier.liquid_free"] // 16
-
-    every = contacts(0.3, 0.3, 0.3)
-    single = [contacts(0.3, 0, 0), contacts(0, 0.3, 0), contacts(0, 0, 0.3)]
-    assert sum(single) == every
-    assert all(0 < number < every for number in single)
-
-
-def test_the_order_of_the_contacts_does_not_matter(load_scene):
-    """Contacts that rub come first; next to no friction on the face puts all in the order of the grid again."""
+def test_next_to_no_friction_on_one_surface_is_none(load_scene):
     scenes = [
         load_scene("case_1", **COARSE | {"barrier.friction": {"face": face, "top": 0.3, "back": 0.3}})
         for face in (0.0, 1e-13)

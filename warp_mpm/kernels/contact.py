@@ -153,10 +153,9 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     def drag_share(parameters: Parameters, time_step: F) -> F:
         """Share of the solid's change of velocity that drag passes on to the liquid within the step."""
         share = F(0.0)
-        if TWO_PHASE:
-            if IMPLICIT_DRAG:
-                drag = parameters.drag_per_mass * time_step
-                share = drag / (parameters.liquid_ratio + drag)
+        if IMPLICIT_DRAG:
+            drag = parameters.drag_per_mass * time_step
+            share = drag / (parameters.liquid_ratio + drag)
         return share
 
     @wp.func
@@ -334,8 +333,9 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
                 )
                 limit = friction * wp.max(normal_force, F(0.0))
                 inertia = F(1.0)
-                share = drag_share(parameters, time_step)
+                share = F(0.0)
                 if TWO_PHASE:
+                    share = drag_share(parameters, time_step)
                     inertia += parameters.liquid_ratio * share
                 slip = wp.dot(solid_velocity, t)
                 old_rub = contact.rubbed[e]

@@ -58,8 +58,9 @@ def make_transfer(
     RELAXATION = effects.pressure_relaxation
     VISCOSITY = effects.bulk_viscosity
     EXTRA_STRESS = effects.skeleton.extra_stress
-    LIQUID_ALONE = effects.liquid_alone and not TWO_PHASE
-    in_hull = bodies_of.in_hull if LIQUID_ALONE else None
+    LIQUID_ALONE = effects.liquid_alone
+    ALONE_OF_MIXTURE = LIQUID_ALONE and not TWO_PHASE
+    in_hull = bodies_of.in_hull if ALONE_OF_MIXTURE else None
     MOVING = effects.moving
     RESTING = not effects.passing
     Bodies = types.Bodies
@@ -200,7 +201,7 @@ def make_transfer(
                     add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
                 deposit(grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope)
 
-        if LIQUID_ALONE:
+        if ALONE_OF_MIXTURE:
             rubbed = wp.bool(False)
             # Only nodes of a surface that rubs read it. A point's farthest node is 1.5 sqrt(2) cells away, and
             # a node acts for a face up to half a cell outside.
