@@ -57,8 +57,8 @@ STATE_OF_BODIES = (
 LANES = 256
 """Threads of the one block that shares the joined places of contact on a GPU, Warp's own size of a block."""
 
-STATE_OF_CONTACT = ("last", "solid", "liquid", "alone", "rubbed")
-"""Arrays of the places of contact that change during a run and are not formed anew in every step."""
+IMPULSES = ("solid", "liquid", "alone", "rubbed")
+"""Arrays of the places of contact that a step leaves to the next."""
 
 
 def _check_names(bodies: Sequence[Body]) -> None:
@@ -687,8 +687,13 @@ class Simulation:
             "grid.shift": self._grid_arrays["shift"],
         }
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
-        # The impulses of a step begin with those of the step before.
-        arrays |= {f"contact.{name}": array for name, array in self._contact_arrays.items() if name in STATE_OF_CONTACT}
+        if self.effects.joined:
+            # Their impulses begin with those of the step before. Places that stand alone begin with none; how many they
+            # are depends on the grid, which is larger for a later end.
+            contact = self._contact_arrays
+            joined = int(contact["colour"].numpy()[0])
+            arrays["contact.last"] = contact["last"]
+            arrays |= {f"contact.{name}": contact[name][joined:] for name in IMPULSES if name in contact}
         return arrays
 
     @_one_thread_at_a_time_on_a_gpu

@@ -45,8 +45,8 @@ def test_momentum_of_the_barrier_is_what_flow_and_base_gave_it(load_scene, mass)
     moving = np.minimum(told["barrier_velocity"], np.roll(told["barrier_velocity"], 1))[1:] > 0.1
     assert moving.sum() > 20
     np.testing.assert_allclose(told["base_force"][1:][moving], limit[1:][moving], rtol=1e-9)
-    # Stable: it is never faster than the jet that pushes it, and each step's equation was solved.
-    assert told["barrier_velocity"].max() < 15.0
+    # Stable: no faster than the flow that pushes it and slides down its face, and each step's equation was solved.
+    assert told["barrier_velocity"].max() < told["speed_max"].max() / np.sin(np.radians(59.7))
     assert told["barrier_velocity"].min() >= 0.0
     assert simulation.record["barrier_unconverged"] == 0
     assert np.abs(told["momentum_residual_x"]).max() < 1e-9 * 810_000.0

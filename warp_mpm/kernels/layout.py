@@ -165,7 +165,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
-        # would exceed the mixture's; with two phases `move` alone writes it.
+        # would exceed the mixture's; with two phases `move` alone writes it. Contact reads nodes without mass too:
+        # `clear` empties them.
         grid["liquid_alone"] = array(dtype=V2, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)

@@ -188,7 +188,7 @@ def _front(
 
 def dry_column(quick: bool) -> Outcome:
     wave_speed = undrained_wave_speed(OEDOMETRIC_MODULUS, 0.0, DRY_DENSITY)
-    checks, panels, _ = _front("dry", "dry", 80 if quick else 160, wave_speed, DRY_DENSITY, 0.01)
+    checks, panels, _ = _front("dry", "dry", 120 if quick else 160, wave_speed, DRY_DENSITY, 0.01)
 
     # Gravity of 1 m/s2 comes on at once: the column swings about its settled state with the period 4 H / c.
     cells, gravity, period = 20 if quick else 40, 1.0, 4.0 / wave_speed
