@@ -1,5 +1,7 @@
 """Every case of `python -m warp_mpm validate` stays within its limits; quick variants here, full ones with `slow`."""
 
+import math
+
 import pytest
 
 from warp_mpm.validation.catalogue import CASES
@@ -9,8 +11,13 @@ KNOWN_SHORT = {
     "jet": ("90°: vertical, deflector and ground", "error of F_y"),
     # A skeleton without rate dependence stops early where it is low, and runs out too far when it falls from high.
     "collapse": ("a = 0.5: run-out", "a = 4: run-out"),
+    # Quadrature of the stress in cells that the face cuts; 16 points per cell leave a fourth.
+    "at-rest": ("greatest speed",),
 }
 """Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
+
+WORST = {"fluid, 75°, 0.25 m: greatest speed": 0.1, "greatest speed": 0.03}
+"""How far a check that falls short may be off today, by words of its quantity; the first that fits counts."""
 
 
 def unexpected(case, quick):
@@ -20,8 +27,14 @@ def unexpected(case, quick):
     return [
         f"{check.quantity}: {check.ours:.6g} {check.unit}, reference {check.reference}, error {check.error}"
         for check in outcome.short
-        if not any(words in check.quantity for words in known)
+        if not any(words in check.quantity for words in known) or not tolerated(check)
     ]
+
+
+def tolerated(check):
+    """Whether a known shortfall is no worse than it was."""
+    bounds = [bound for words, bound in WORST.items() if words in check.quantity]
+    return check.error is None or check.error <= (bounds[0] if bounds else math.inf)
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case.in_quick], ids=lambda case: case.name)
