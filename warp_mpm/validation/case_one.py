@@ -68,6 +68,8 @@ def face_friction(quick: bool) -> Outcome:
                     ratio / shares[layer],
                     1.0,
                     0.05,
+                    remark="the skeleton's stress differs by some percent from one cell to the next; in the one "
+                    "after it and at 0.1 m the share is met",
                 )
             )
         curves.append(Curve(np.arange(LAYERS) + 0.5, shares / ratio, f"{spacing:g} m", "o-"))
@@ -102,6 +104,12 @@ ENDS = {"case_1": ("case 1", 6.0), "set_iib": ("Set IIb", IMPACT)}
 """Title and end [s] of the scenes; the barrier of case 1 has stopped at its end."""
 
 
+LONG_SLIDE = (
+    "forces and impulse agree; the displacement at the end is the small difference of thrust and friction at the base "
+    "over seconds, and still moves in the first order of the time step"
+)
+
+
 def figures(name: str, spacing: float, courant_number: float, interval: float, end: float) -> Array:
     """`FIGURES` of one of the paper's scenes, recorded every `interval` [s], which divides `MARK`, until `end` [s]."""
     scene = paper_scene(
@@ -129,9 +137,9 @@ def figures(name: str, spacing: float, courant_number: float, interval: float, e
 def time_step(quick: bool) -> Outcome:
     spacing = 0.4 if quick else 0.2
     settings = (
-        [(0.95, MARK), (0.95, 1e-3), (0.25, MARK)] if quick else [(0.95, MARK), (0.5, MARK), (0.95, 1e-4), (0.1, MARK)]
+        [(0.95, MARK), (0.95, 1e-3), (0.5, MARK)] if quick else [(0.95, MARK), (0.5, MARK), (0.95, 1e-4), (0.1, MARK)]
     )
-    scenes = {"case_1": ("case 1", IMPACT)} if quick else ENDS
+    scenes = {"case_1": ENDS["case_1"]} if quick else ENDS
     checks: list[Check] = []
     tables: list[Table] = []
     for name, (title, end) in scenes.items():
@@ -139,7 +147,9 @@ def time_step(quick: bool) -> Outcome:
         labels = [f"Courant number {number:g}, a record every {1e3 * interval:g} ms" for number, interval in settings]
         for label, ours in zip(labels[:-1], found, strict=False):
             for (figure, unit), value, finest in zip(FIGURES.items(), ours, found[-1], strict=True):
-                checks.append(compared(f"{title}: {figure}; {label}", unit, float(value), float(finest), 0.01))
+                checks.append(
+                    compared(f"{title}: {figure}; {label}", unit, float(value), float(finest), 0.01, remark=LONG_SLIDE)
+                )
         rows = [(label, *(f"{value:.5g}" for value in row)) for label, row in zip(labels, found, strict=True)]
         columns = ("", *(f"{figure} [{unit}]" for figure, unit in FIGURES.items()))
         tables.append(Table(f"{title} at {spacing:g} m, until {end:g} s", columns, rows))
@@ -161,7 +171,7 @@ CASES = (
         name="time-step",
         title="Time step and record interval",
         tests="Case 1 at 0.2 m until its barrier has stopped, and Set IIb until 1.2 s, with a half and a tenth of the "
-        "time step, and with records that cut the steps short; quick: case 1 at 0.4 m until 1.2 s.",
+        "time step, and with records that cut the steps short; quick: case 1 at 0.4 m, with a half.",
         source="the run of the smallest Courant number",
         limit="displacement, peak, impulse and kinetic energy within 1 %",
         run=time_step,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -24,9 +25,13 @@ G = 9.81
 COURANT_NUMBERS = (0.95, 0.25, 0.05)
 
 
-def observed_order(spacings: Array, errors: Array) -> float:
-    """Slope of the errors' sizes over the spacings in a double logarithmic diagram, by least squares."""
-    return float(np.polyfit(np.log(spacings), np.log(np.abs(errors)), 1)[0])
+def observed_order(errors: Sequence[float]) -> float:
+    """Order from runs of halved spacing: of the last three from their differences, which no limit of the reference
+    itself enters; of two from their ratio, as if they tended to the reference."""
+    if len(errors) == 2:
+        return math.log2(abs(errors[0] / errors[1]))
+    coarse, middle, fine = errors[-3:]
+    return math.log2(abs((coarse - middle) / (middle - fine)))
 
 
 # -- sloshing ----------------------------------------------------------------------------------------------------
@@ -106,7 +111,7 @@ def sloshing(quick: bool) -> Outcome:
                     at_most(f"32 cells a wave, {label}: error of the frequency", "-", error, 0.01, percent=True),
                 ]
                 curves.append(Curve(times, amplitude, label, style[1:]))
-        order = observed_order(1.0 / np.array(ladder), np.array(errors))
+        order = observed_order(errors)
         checks.append(
             holds(
                 f"Courant number {number:g}: order of the frequency's error, {ladder[0]} to {ladder[-1]} cells",
@@ -114,7 +119,6 @@ def sloshing(quick: bool) -> Outcome:
                 order,
                 order >= 1.8,
                 reference="≥ 1.8; errors " + ", ".join(f"{100 * error:.2g} %" for error in errors),
-                remark=LESS_THAN_SECOND,
             )
         )
         damping.append(Curve(ladder, np.abs(ratios), f"Courant number {number:g}", style))
@@ -130,10 +134,12 @@ def sloshing(quick: bool) -> Outcome:
             ),
             Panel("damping ratio", "cells a wavelength", "|ζ|", damping, log_x=True, log_y=True),
         ],
+        remarks=[
+            "Linear theory is not the limit of these runs to better than some tenths of a percent: the wave has a "
+            "height (k a = 0.08), and the fluid gives way a little (g h/c² = 0.003). The order is therefore taken from "
+            "the differences of three spacings where there are three."
+        ],
     )
-
-
-LESS_THAN_SECOND = "PLACEHOLDER"
 
 
 # -- a disc that turns -------------------------------------------------------------------------------------------
@@ -276,7 +282,7 @@ def rough_slope(quick: bool) -> Outcome:
         checks.append(
             compared("the same, 10 cells, Courant number 0.25", "m/s²", acceleration, exact, 0.03),
         )
-    order = observed_order(1.0 / np.array(ladder), np.array(errors))
+    order = observed_order(errors)
     checks.append(
         holds(
             f"order of its error, {ladder[0]} to {ladder[-1]} cells, or all that is left is below 0.5 %",
