@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: run test test-browser lint validate docs clean
+.PHONY: run test test-browser coverage lint validate docs clean
 
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -27,6 +27,13 @@ lint: $(VENV)/.test
 # A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice.
 test: lint
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+
+# Functions that Warp compiles are left out: Python does not run them.
+coverage: $(VENV)/.test
+	mkdir -p build && rm -f build/coverage*
+	$(BIN)/python -m coverage run -m pytest -n $(JOBS) --dist loadfile
+	$(BIN)/python -m coverage combine --quiet
+	$(BIN)/python -m coverage report --skip-covered --sort=cover
 
 validate: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) -m slow

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import errno
 import re
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Annotated, Any, get_args
 
 import typer
@@ -16,6 +19,35 @@ from analytic.whole_file import UnwrittenError
 
 BAD_INPUT = 2
 """Exit code of an input that cannot be used."""
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, and after what ends a process from outside."""
+
+
+def other_ends() -> list[signal.Signals]:
+    """Signals beside Ctrl-C that ask a process to end; not that of a closed terminal where `nohup` has it ignored."""
+    found = [signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # Windows has none
+        found.append(signal.SIGHUP)
+    return found
+
+
+@contextmanager
+def ended_as_by_ctrl_c() -> Iterator[None]:
+    """Let what asks the process to end do what Ctrl-C does, so that everything is tidied up on the way."""
+    if threading.current_thread() is not threading.main_thread():  # which alone may receive signals
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, end) for number in other_ends()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
@@ -80,7 +112,7 @@ class CommandLine(TyperGroup):
             _as_plain_text(command)
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        with standard_streams() as output:
+        with standard_streams() as output, ended_as_by_ctrl_c():
             try:
                 return super().main(*arguments, **options)
             except SystemExit as end:

@@ -66,7 +66,7 @@ def read_time_series(path: str | Path) -> Series:
             warnings.simplefilter("error")  # a file without rows is only worth a warning to NumPy
             table = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2)
     except (ValueError, UserWarning) as error:
-        raise TimeSeriesError(f"{path} holds something else than rows of numbers: {error}.") from None
+        raise TimeSeriesError(f"{path} holds something else than rows of numbers: {str(error).rstrip('.')}.") from None
     if table.shape[1] != header.count(",") + 1:
         raise TimeSeriesError(
             f"{path} has {header.count(',') + 1} columns in its header, {table.shape[1]} in its rows."

@@ -34,7 +34,7 @@ _ROOT = _HERE.parent
 _COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
 _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
-_IMPORT_OF_ANALYTIC = re.compile(r"^( *)from analytic\.", re.MULTILINE)
+_IMPORT_FROM_OUTSIDE = re.compile(r"^( *)from (?:analytic|warp_mpm\.quantities)\.", re.MULTILINE)
 
 _WRAPPER_FAULTS = {
     # pythonfmu 0.7.0, linux64: when the process exits, a function that runs after the destructors releases the
@@ -71,13 +71,14 @@ class BuildError(Exception):
 @dataclass(frozen=True)
 class PythonUnit:
     """A unit that pythonfmu packs: its module in ``fmu/units``, its slave class, and other modules that it needs, of
-    that folder and of ``analytic``."""
+    that folder, of ``analytic`` and of ``warp_mpm/quantities``."""
 
     name: str
     module: str
     slave: str
     other_modules: tuple[str, ...] = ()
     analytic_modules: tuple[str, ...] = ()
+    quantity_modules: tuple[str, ...] = ()
 
     @property
     def interface(self) -> Interface:
@@ -93,7 +94,10 @@ PYTHON_UNITS = (
         "BarrierSliding", "barrier_sliding", "BarrierSlidingSlave", analytic_modules=("impact.py", "sliding.py")
     ),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
-    PythonUnit("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+    PythonUnit(
+        *("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+        quantity_modules=("quantity.py", "time_series.py"),
+    ),
 )
 
 
@@ -169,7 +173,9 @@ def _shipped_sources(unit: PythonUnit) -> dict[str, str]:
     names = (*_COMMON_MODULES, f"{unit.module}.py", *unit.other_modules)
     sources = {name: (_UNITS / name).read_text(encoding="utf-8") for name in names}
     sources |= {name: (_ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
-    return {name: _IMPORT_OF_ANALYTIC.sub(r"\1from .", text) for name, text in sources.items()}
+    outside = _ROOT / "warp_mpm" / "quantities"
+    sources |= {name: (outside / name).read_text(encoding="utf-8") for name in unit.quantity_modules}
+    return {name: _IMPORT_FROM_OUTSIDE.sub(r"\1from .", text) for name, text in sources.items()}
 
 
 def _run_pythonfmu(stage: Path, script: str, package: str) -> None:

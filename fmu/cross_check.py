@@ -17,6 +17,7 @@ Four ways of giving the unit its force are compared with the simulation:
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -30,6 +31,7 @@ from analytic.calibration import bounded_from_below, calibrate, measure, measure
 from analytic.force_record import cumulative_impulse, moving_mean
 from analytic.scene import ASSUMED_RISE_RATIO, Scene, scene_of
 from fmu.instance import instance
+from warp_mpm.quantities import figures
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario
@@ -37,11 +39,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FIGURES = {
-    "peak_force": ("peak force", "kN/m", 1e-3),
-    "peak_force_time": ("time of the peak", "s", 1.0),
-    "impulse": ("impulse", "kN s/m", 1e-3),
-    "barrier_velocity_max": ("v2,max", "m/s", 1.0),
-    "barrier_displacement_final": ("Δx_f", "m", 1.0),
+    name: (figure.short or figure.symbol or figure.words, figure.shown_unit, figure.factor)
+    for name, figure in figures.FIGURES.items()
+    if name in ("peak_force", "peak_force_time", "impulse", "barrier_velocity_max", "barrier_displacement_final")
 }
 """Key figures by name: label, unit shown, and its factor from SI."""
 
@@ -176,26 +176,23 @@ def simulate(
 ) -> Trajectory:
     """The simulation's force on the barrier and its motion, at the interval of the scenario's time series."""
     from warp_mpm import Simulation
+    from warp_mpm.recording import Schedule, SeriesInMemory, record_until
 
-    simulation = Simulation(scenario, device=device)
-    count = round(scenario.output.end_time_s / scenario.output.time_series_interval_s)
-    rows = []
-    for step in range(count + 1):
-        simulation.advance(until=step * scenario.output.time_series_interval_s)
-        sample = simulation.sample()
-        surfaces = ("impact_force", "top_force", "back_force")
-        rows.append(
-            (
-                sample["time"],
-                sum(sample[f"{surface}_x"] for surface in surfaces),
-                sample["barrier_velocity"],
-                sample["barrier_displacement"],
-                -sum(sample[f"{surface}_y"] for surface in surfaces),
-            )
-        )
-        if on_progress is not None and step % 20 == 0:
-            on_progress(sample["time"])
-    return Trajectory(*np.array(rows).T)
+    recorder, steps = SeriesInMemory(Schedule(scenario.output.time_series_interval_s)), itertools.count(1)
+
+    def told(simulation: Any) -> None:
+        if on_progress is not None and next(steps) % 20 == 0:
+            on_progress(simulation.time)
+
+    record_until(Simulation(scenario, device=device), [recorder], scenario.output.end_time_s, on_step=told)
+    series = recorder.series()
+    return Trajectory(
+        series["time"],
+        series["impact_force_x"] + series["top_force"] + series["back_force_x"],
+        series["barrier_velocity"],
+        series["barrier_displacement"],
+        -(series["impact_force_y"] + series["top_force_y"] + series["back_force_y"]),
+    )
 
 
 def scene_parameters(scene: Scene) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from fmu.units.worker_process import PROTOCOL
+from fmu.units.worker_process import PROTOCOL, RECORDED
 
 HOST_CHECK_INTERVAL = 0.5
 """Time between looks at whether the host is still there [s], for a host that ends during a long step."""
@@ -71,21 +71,17 @@ class Worker:
         return self.sample() | (self.overtopped_volume() if overtopped else {})
 
     def sample(self) -> dict[str, Any]:
+        from warp_mpm.quantities.time_series import NAMED
+
         values = self.simulation.sample()
         wrong = [name for name, value in values.items() if not math.isfinite(value)]
         if wrong:
             raise RefusedRequestError(f"The simulation gave {values[wrong[0]]} for {wrong[0]}.")
         surfaces = ("impact_force", "top_force", "back_force")
         return {
-            "impact_force_x": values.get("impact_force_x", 0.0),
-            "impact_force_y": values.get("impact_force_y", 0.0),
-            "top_force": values.get("top_force_x", 0.0),
+            **{name: values.get(NAMED[name].key, 0.0) for name in RECORDED},
             "barrier_force": sum(values.get(f"{surface}_x", 0.0) for surface in surfaces),
             "vertical_load": 0.0 - sum(values.get(f"{surface}_y", 0.0) for surface in surfaces),
-            "barrier_velocity": values.get("barrier_velocity", 0.0),
-            "barrier_displacement": values.get("barrier_displacement", 0.0),
-            "pore_pressure_max": values.get("pore_pressure_max", 0.0),
-            "flow_kinetic_energy": values["flow_kinetic_energy"],
         }
 
     def overtopped_volume(self) -> dict[str, Any]:

@@ -6,9 +6,12 @@ from pathlib import Path
 
 def main() -> None:
     """Run the command line."""
-    from warp_mpm import cli
+    try:
+        from warp_mpm import cli
 
-    cli.main()
+        cli.main()
+    except KeyboardInterrupt:  # while the command line itself is loaded
+        sys.exit(130)
 
 
 if __name__ == "__main__":

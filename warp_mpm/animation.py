@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,9 +15,11 @@ from matplotlib.figure import Figure
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.whole_file import whole_file
 from warp_mpm.extras import missing
-from warp_mpm.fields import Field, colour_limits, field_named
+from warp_mpm.fields import colour_limits, field_named
 from warp_mpm.plotting.points import Window, draw_points, draw_surroundings, in_lines, shown, window
-from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading
+from warp_mpm.plotting.style import BLUE, GREY, ORANGE, PlotError, check_path, grid, heading, symbol
+from warp_mpm.quantities.points import Drawn
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results, ResultsError
 
 FORMATS = ("mp4", "gif")
@@ -63,7 +66,7 @@ def write_film(
         write(_pictures(results, field, width, watch(range(0, len(snapshots), stride))), aside, rate)
 
 
-def _pictures(results: Results, field: Field, width: int, frames: Iterable[int]) -> Iterator[np.ndarray]:
+def _pictures(results: Results, field: Drawn, width: int, frames: Iterable[int]) -> Iterator[np.ndarray]:
     """RGB pictures [height, width, 3] of the snapshots."""
     scenario, snapshots = results.scenario, results.snapshots
     sparse = [snapshots[index] for index in np.unique(np.linspace(0, len(snapshots) - 1, 25).astype(int))]
@@ -112,14 +115,17 @@ def _draw_curves(panel: Any, results: Results) -> list[Any]:
     """Force and displacement against time; returns the line that marks the present."""
     series = results.time_series
     time = series["time"]
-    panel.plot(time, moving_mean(time, series["impact_force_x"]) / 1e3, color=BLUE)
+    force, moved = NAMED["impact_force_x"], NAMED["barrier_displacement"]
+    panel.plot(time, moving_mean(time, series[force.name]) * force.factor, color=BLUE)
     panel.set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
-    panel.set_ylabel(f"impact force $F_{{2,x}}$\n[kN/m], {FILTER_WINDOW:g} s mean", color=BLUE, fontsize=9)
+    panel.set_ylabel(
+        f"impact force {symbol(force)}\n[{force.shown_unit}], {FILTER_WINDOW:g} s mean", color=BLUE, fontsize=9
+    )
     grid(panel)
-    if np.any(series.get("barrier_displacement", 0.0)):
+    if np.any(series.get(moved.name, 0.0)):
         other = panel.twinx()
-        other.plot(time, series["barrier_displacement"], color=ORANGE, linestyle="--")
-        other.set_ylabel("barrier\ndisplacement [m]", color=ORANGE, fontsize=9)
+        other.plot(time, series[moved.name] * moved.factor, color=ORANGE, linestyle="--")
+        other.set_ylabel(f"barrier\ndisplacement [{moved.shown_unit}]", color=ORANGE, fontsize=9)
         other.set_ylim(bottom=0.0)
     return [panel.axvline(0.0, color=GREY)]
 
@@ -153,3 +159,22 @@ def _write_mp4(pictures: Iterator[np.ndarray], target: Path, rate: float) -> Non
             writer.send(np.ascontiguousarray(picture))
     finally:
         writer.close()
+    if not _is_whole_mp4(target):  # the encoder's own exit code is not told
+        raise OSError(errno.EIO, "the encoder could not write all of it; the disk may be full")
+
+
+def _is_whole_mp4(file: Path) -> bool:
+    """Whether its boxes (ISO/IEC 14496-12, 4.2) end where the file does, the index among them."""
+    names, place, size = set(), 0, file.stat().st_size
+    with file.open("rb") as stream:
+        while place < size:
+            stream.seek(place)
+            head = stream.read(16)
+            length = int.from_bytes(head[:4], "big")
+            if length == 1:
+                length = int.from_bytes(head[8:], "big")
+            if length < 8:
+                return False
+            names.add(head[4:8])
+            place += length
+    return place == size and b"moov" in names

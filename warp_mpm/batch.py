@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
+import os
 import sys
-import time
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-POLL = 0.2
-"""Time between looks at the processes [s]."""
+from warp_mpm.engine import Processes, Task
 
 
 @dataclass(frozen=True)
@@ -57,40 +57,36 @@ def run_jobs(
     Returns:
         The ends of the jobs that were begun, in their order of ending.
     """
-    waiting, ends = list(jobs), []
-    running: dict[Job, subprocess.Popen[str]] = {}
-    told = False
-    try:
-        while running or (waiting and not stop()):
-            while waiting and len(running) < at_once and not stop():
-                job = waiting.pop(0)
-                running[job] = subprocess.Popen(
-                    [sys.executable, "-m", "warp_mpm", "run", *job.arguments, "--quiet"],
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.PIPE,
-                    text=True,
-                    start_new_session=True,  # Ctrl-C is for this process, which passes it on once
-                )
-                on_start(job)
-            time.sleep(POLL)
-            if stop() and not told:
-                told = True
-                for process in running.values():
-                    process.terminate()
-            for job, process in list(running.items()):
-                if process.poll() is None:
-                    on_progress(job, _simulated_time(job.folder))
-                    continue
-                del running[job]
-                assert process.stderr is not None
-                end = JobEnd(job, process.returncode, process.stderr.read().strip())
-                process.stderr.close()
-                ends.append(end)
-                on_end(end)
-    finally:
-        for process in running.values():
-            process.terminate()
+    by_name = {job.name: job for job in jobs}
+    ends = []
+    for ended in Processes(at_once).run(
+        [Task(job.name, run_command, (job.arguments,)) for job in jobs],
+        on_start=lambda task: on_start(by_name[task.name]),
+        on_look=lambda task: on_progress(by_name[task.name], _simulated_time(by_name[task.name].folder)),
+        stop=stop,
+    ):
+        code, message = (ended.exit_code or 1, ended.problem or "") if ended.result is None else ended.result
+        ends.append(JobEnd(by_name[ended.task.name], code, message))
+        on_end(ends[-1])
     return ends
+
+
+def run_command(arguments: Sequence[str]) -> tuple[int, str]:
+    """`warp-mpm run` with these arguments in this process; its exit code, and what it wrote to standard error."""
+    from warp_mpm.__main__ import main
+
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as told, open(os.devnull, "w", encoding="utf-8") as nowhere:
+        os.dup2(told.fileno(), 2)
+        os.dup2(nowhere.fileno(), 1)
+        sys.argv = ["warp-mpm", "run", *arguments, "--quiet"]
+        code: Any = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+        sys.stderr.flush()
+        told.seek(0)
+        return code if isinstance(code, int) else int(code is not None), told.read().strip()
 
 
 def _simulated_time(folder: Path) -> float:

@@ -148,14 +148,19 @@ def run(
         probing = time.process_time() - begun
     from warp_mpm.simulation import Simulation, SimulationDiverged
 
+    signal = StopOnSignal()
+
     def make_simulation(scenario: Scenario) -> Simulation:
         try:
-            return Simulation(scenario, device=device)
+            with signal.at_once():
+                simulation = Simulation(scenario, device=device)
+                simulation.prepare()
         except ValueError as error:
             _refuse(str(error))
+        return simulation
 
     try:
-        with StopOnSignal() as signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display:
+        with signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display:
             stopped = lambda: signal.received  # noqa: E731
             if resume is not None:
                 outcome = resume_run(folder, make_simulation=make_simulation, on_progress=display.show, stop=stopped)

@@ -2,76 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.quantities.points import DRAWN, Drawn
 from warp_mpm.results import Snapshot
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Field:
-    """A quantity by which points can be coloured."""
-
-    name: str
-    label: str
-    unit: str
-    signed: bool = False
-    """Whether nil is the middle of the colours."""
-
-    @property
-    def title(self) -> str:
-        """Label with unit."""
-        return f"{self.label} [{self.unit}]"
+FIELDS = tuple(DRAWN.values())
+"""Quantities by which points can be coloured."""
 
 
-FIELDS = (
-    Field("pore_pressure", "pore pressure", "kPa"),
-    Field("speed", "speed of the solid", "m/s"),
-    Field("slip", "speed of the liquid relative to the solid", "m/s"),
-    Field("volumetric_strain", "volumetric strain, expansion +", "%", signed=True),
-    Field("mean_effective_stress", "mean effective stress, compression +", "kPa"),
-    Field("deviatoric_strain", "cumulative deviatoric strain", "-"),
-)
-
-
-def field_named(name: str) -> Field:
+def field_named(name: str) -> Drawn:
     """The field of that name.
 
     Raises:
         ValueError: there is none.
     """
-    for field in FIELDS:
-        if field.name == name:
-            return field
-    raise ValueError(f"field = {name!r} is not known; it must be one of {', '.join(one.name for one in FIELDS)}.")
+    if name not in DRAWN:
+        raise ValueError(f"field = {name!r} is not known; it must be one of {', '.join(DRAWN)}.")
+    return DRAWN[name]
 
 
 def field_values(snapshot: Snapshot, name: str, solid_density: float) -> Array | None:
-    """Values [N] of a field, in its unit; None where the run has no such field.
+    """Values [N] of a field, in the unit in which it is shown; None where the run has no such field.
 
     Args:
         snapshot: of N points.
         name: of a field.
-        solid_density: initial mass of solid per volume of the whole [kg/m³]. The volumetric strain is V / V_0 - 1, with
-            V_0 from the point's solid mass, which it keeps.
+        solid_density: initial mass of solid per volume of the whole [kg/m³].
     """
-    if name == "pore_pressure":
-        return snapshot[name] / 1e3 if name in snapshot else None
-    if name == "speed":
-        return np.hypot(*snapshot["solid_velocity"].T)
-    if name == "slip":
-        if "liquid_velocity" not in snapshot:
-            return None
-        return np.hypot(*(snapshot["liquid_velocity"] - snapshot["solid_velocity"]).T)
-    if name == "volumetric_strain":
-        return 100.0 * (snapshot["volume"] * solid_density / snapshot["solid_mass"] - 1.0)
-    if name == "mean_effective_stress":
-        return -snapshot["effective_stress"][:, :3].mean(axis=1) / 1e3
-    return snapshot[name]
+    field = DRAWN[name]
+    if any(need not in snapshot for need in field.needs):
+        return None
+    return field.values(snapshot, solid_density) * field.factor
 
 
 def colour_limits(values: Array, signed: bool) -> tuple[float, float]:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -23,10 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.extras import missing
-from warp_mpm.quantities import POINT_FIELDS, TIME_SERIES, time_series_quantity
+from warp_mpm.quantities import SUMMED_UP, Quantity, quantity_of_column
+from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.points import POINT_FIELDS, POSITION
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.recording import run_folder
-from warp_mpm.recording.time_series import key_of
+from warp_mpm.recording.time_series import column_named
 from warp_mpm.scenario import Scenario
+from warp_mpm.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 
@@ -39,7 +42,7 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("problem", "git_commit"), (str, NoneType)),
     "git_changed": (bool, NoneType),
     **dict.fromkeys(("command", "resumed"), (list,)),
-    **dict.fromkeys(("effects", "versions"), (dict,)),
+    **dict.fromkeys(("effects", "versions", "quantities"), (dict,)),
     **dict.fromkeys(("preparation_time", "simulated_time", "wall_time"), (int, float)),
     **dict.fromkeys(("time_step_min", "time_step_max"), (int, float, NoneType)),
     **dict.fromkeys(("material_points", "steps", "points_left", "points_pushed_out", "voids_closed"), (int,)),
@@ -48,31 +51,29 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
 }
 """What the entries of a run's record are, as far as anyone reads them."""
 
+_NUMBER = (int, float, NoneType)
+
+SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(FIGURES, _NUMBER),
+    **dict.fromkeys(("peak_force_filtered_time", "barrier_velocity_max_time"), _NUMBER),
+    **dict.fromkeys(("pore_pressure_max_time", "pore_pressure_max_anywhere_time"), _NUMBER),
+    **dict.fromkeys(("end_time", "material_points", "steps", "time_step_min", "time_step_max"), _NUMBER),
+    **dict.fromkeys(("initial_volume", "left_volume"), _NUMBER),
+    **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
+    **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
+    **dict.fromkeys(("definitions", "mechanism_measures"), (dict, NoneType)),
+    "notes": (list,),
+}
+"""The same of its summary; figures of quantities that a script records are numbers too."""
+
+PRECISIONS = ("float64", "float32")
+"""What `effects.precision` of a record may be."""
+
 _WORDS = {str: "a text", NoneType: "null", bool: "true or false", list: "a list", dict: "a group of fields"}
 
 
 class ResultsError(ValueError):
     """A run folder that cannot be read; the message names the file and what is wrong with it."""
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The material points at one time."""
-
-    time: float
-    """[s]."""
-    barrier_displacement: float | None
-    """[m]; None without a barrier."""
-    position: Array
-    """[N, 2] m."""
-    fields: dict[str, Array] = field(repr=False)
-    """Arrays with N rows in SI units: velocities [N, 2], effective_stress [N, 4] (xx, yy, zz, xy), others [N]."""
-
-    def __getitem__(self, name: str) -> Array:
-        return self.fields[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.fields
 
 
 class Snapshots:
@@ -208,17 +209,13 @@ class Results:
         Raises:
             ResultsError: the file is missing or damaged, or an entry is of another kind than a run writes.
         """
-        record = self._json(run_folder.RECORD)
-        for name, kinds in RECORD_KINDS.items():
-            value = record.get(name)
-            right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
-            if name in record and not (right and (not isinstance(value, float) or math.isfinite(value))):
-                words = [_WORDS[kind] for kind in kinds if kind in _WORDS]
-                words += ["a number" if float in kinds else "a whole number"] if int in kinds else []
-                raise ResultsError(
-                    f"{self.path / run_folder.RECORD} is damaged: {name} = {json.dumps(value)[:80]} must be "
-                    f"{' or '.join(words)}."
-                )
+        record = self._json(run_folder.RECORD, RECORD_KINDS.get)
+        precision = record.get("effects", {}).get("precision", PRECISIONS[0])
+        if precision not in PRECISIONS:
+            raise ResultsError(
+                f"{self.path / run_folder.RECORD} is damaged: effects.precision = {json.dumps(precision)[:80]} must be "
+                f"{' or '.join(PRECISIONS)}."
+            )
         return record
 
     @cached_property
@@ -233,7 +230,7 @@ class Results:
                 f"{self.path / run_folder.SUMMARY} is missing: the run has not come to its end; to go on with it: "
                 f"python -m warp_mpm run --resume {self.path}"
             )
-        return self._json(run_folder.SUMMARY)
+        return self._json(run_folder.SUMMARY, _kinds_of_figure)
 
     @cached_property
     def time_series(self) -> dict[str, Array]:
@@ -242,7 +239,34 @@ class Results:
         Raises:
             ResultsError: the file is missing or damaged.
         """
-        return read_time_series(self.path / run_folder.TIME_SERIES)
+        return read_time_series(self.path / run_folder.TIME_SERIES, self._own_quantities())
+
+    @cached_property
+    def quantities(self) -> dict[str, Quantity]:
+        """What the columns of the time series are, by name.
+
+        Raises:
+            ResultsError: the time series or the record is missing or damaged.
+        """
+        own = self._own_quantities()
+        found = {name: own.get(name) or quantity_of_column(name) for name in self.time_series}
+        return {name: quantity for name, quantity in found.items() if quantity is not None}
+
+    def _own_quantities(self) -> dict[str, Quantity]:
+        """Those that the script registered which made the run."""
+        if not (self.path / run_folder.RECORD).exists():
+            return {}
+        own = {}
+        for name, said in self.record.get("quantities", {}).items():
+            try:
+                unit, meaning, label, symbol = (str(said[part]) for part in ("unit", "meaning", "label", "symbol"))
+                own[name] = Quantity(name, unit, meaning, label, symbol)
+            except (KeyError, TypeError):
+                raise ResultsError(
+                    f"{self.path / run_folder.RECORD} is damaged: quantities.{name} = {json.dumps(said)[:80]} must be "
+                    "a group of unit, meaning, label and symbol."
+                ) from None
+        return own
 
     def frame(self) -> Any:
         """The time series as a pandas DataFrame, indexed by time [s]; `frame.attrs["units"]` has each column's unit and
@@ -255,12 +279,11 @@ class Results:
         pd = _optional("Results.frame()", "pandas")
 
         series = self.time_series
-        columns_known = {quantity.name: quantity for quantity in TIME_SERIES.values()}
-        known = {name: columns_known.get(name) or time_series_quantity(name) for name in series}
+        known = self.quantities
         columns = {name: values for name, values in series.items() if name != "time"}
         frame = pd.DataFrame(columns, index=pd.Index(series["time"], name="time"))
-        frame.attrs["units"] = {name: quantity.unit for name, quantity in known.items() if quantity}
-        frame.attrs["meanings"] = {name: quantity.meaning for name, quantity in known.items() if quantity}
+        frame.attrs["units"] = {name: quantity.unit for name, quantity in known.items()}
+        frame.attrs["meanings"] = {name: quantity.meaning for name, quantity in known.items()}
         return frame
 
     def dataset(self) -> Any:
@@ -290,12 +313,12 @@ class Results:
         for name in ("position", *self.snapshots.names):
             arrays = [frame.position if name == "position" else frame[name] for frame in frames]
             width = arrays[0].shape[1] if arrays[0].ndim == 2 else 1
-            unit, meaning = (
-                ("m", "position") if name == "position" else (POINT_FIELDS[name].unit, POINT_FIELDS[name].meaning)
-            )
-            variables[name] = (("time", "point", *kinds[width]), stacked(arrays), {"units": unit, "long_name": meaning})
+            one = POINT_FIELDS.get(name, POSITION)
+            said = {"units": one.unit, "long_name": one.meaning}
+            variables[name] = (("time", "point", *kinds[width]), stacked(arrays), said)
         shifts = [np.nan if frame.barrier_displacement is None else frame.barrier_displacement for frame in frames]
-        variables["barrier_displacement"] = ("time", shifts, {"units": "m", "long_name": "displacement of the barrier"})
+        moved = NAMED["barrier_displacement"]
+        variables[moved.name] = ("time", shifts, {"units": moved.unit, "long_name": moved.meaning})
         coordinates = {
             "time": ("time", [frame.time for frame in frames], {"units": "s"}),
             "axis": ["x", "y"],
@@ -312,7 +335,8 @@ class Results:
         """
         return Snapshots(self.path / run_folder.SNAPSHOTS)
 
-    def _json(self, name: str) -> dict[str, Any]:
+    def _json(self, name: str, kinds_of: Callable[[str], tuple[type, ...] | None]) -> dict[str, Any]:
+        """A group of fields, each of the kinds that `kinds_of` tells for its name, if any."""
         try:
             content = json.loads((self.path / name).read_text(encoding="utf-8"))
         except FileNotFoundError:
@@ -323,7 +347,24 @@ class Results:
             raise ResultsError(f"{self.path / name} cannot be read: {error}.") from None
         if not isinstance(content, dict):
             raise ResultsError(f"{self.path / name} does not hold a group of fields.")
+        for entry, value in content.items():
+            kinds = kinds_of(entry)
+            if kinds is None:
+                continue
+            right = isinstance(value, kinds) and (bool in kinds or not isinstance(value, bool))
+            if not (right and (not isinstance(value, float) or math.isfinite(value))):
+                words = [_WORDS[kind] for kind in kinds if kind in _WORDS]
+                words += ["a number" if float in kinds else "a whole number"] if int in kinds else []
+                raise ResultsError(
+                    f"{self.path / name} is damaged: {entry} = {json.dumps(value)[:80]} must be {' or '.join(words)}."
+                )
         return content
+
+
+def _kinds_of_figure(name: str) -> tuple[type, ...] | None:
+    """Kinds of an entry of a summary; None where any will do."""
+    of_own_quantity = name.endswith(tuple(f"_{figure}" for figure in SUMMED_UP))
+    return SUMMARY_KINDS.get(name, _NUMBER if of_own_quantity else None)
 
 
 def _optional(what: str, package: str) -> Any:
@@ -338,15 +379,19 @@ def _optional(what: str, package: str) -> Any:
         raise ModuleNotFoundError(missing(what, package, "xarray"), name=package) from None
 
 
-def read_time_series(path: str | Path) -> dict[str, Array]:
+def read_time_series(path: str | Path, own: Mapping[str, Quantity] | None = None) -> dict[str, Array]:
     """Columns of a run's `timeseries.csv` by name (without unit), each [samples].
 
+    Args:
+        path: of the file.
+        own: quantities that the run's script registered, by name.
+
     Raises:
-        ResultsError: the file is missing or damaged, or a number in it is not finite.
+        ResultsError: the file is missing or damaged, a number in it is not finite, or its time does not increase.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a spreadsheet that saved it puts a mark in front
     except FileNotFoundError:
         raise ResultsError(f"{path} is missing.") from None
     except OSError as error:
@@ -357,10 +402,16 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
     if not lines:
         raise ResultsError(f"{path} is empty.")
     header = lines[0].split(",")
-    keys = {label: key_of(label) for label in header}
-    unknown = [label for label, key in keys.items() if key is None]
+    headings = {one.heading for one in (own or {}).values()}
+    unknown = [heading for heading in header if column_named(heading) is None and heading not in headings]
     if unknown:
         raise ResultsError(f"{path} has the column {unknown[0]!r}, which no run writes.")
+    names = [label.partition(" [")[0] for label in header]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ResultsError(f"{path} has the column {twice[0]!r} twice.")
+    if "time" not in names:
+        raise ResultsError(f"{path} has no column 'time [s]'.")
     values = np.empty((len(lines) - 1, len(header)))
     for number, line in enumerate(lines[1:]):
         cells = line.split(",")
@@ -370,10 +421,12 @@ def read_time_series(path: str | Path) -> dict[str, Array]:
             values[number] = [float(cell) for cell in cells]
         except ValueError:
             raise ResultsError(f"{path} is damaged in line {number + 2}.") from None
-    names = [label.partition(" [")[0] for label in header]
     if not np.isfinite(values).all():
         line, column = np.argwhere(~np.isfinite(values))[0]
         raise ResultsError(
             f"{path} line {line + 2}: {names[column]} is {values[line, column]:g}, it must be a finite number."
         )
+    stalled = np.flatnonzero(np.diff(values[:, names.index("time")]) <= 0.0)
+    if stalled.size:
+        raise ResultsError(f"{path} line {stalled[0] + 3}: time does not increase.")
     return {name: values[:, column] for column, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""A whole run: a scenario in, a run folder out."""
+"""A whole run: a scenario in, a run folder out, or the same in memory. Both are one loop with different recorders."""
 
 from __future__ import annotations
 
@@ -7,32 +7,38 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mpm.caveats import run_caveats, scene_caveats
+from warp_mpm.quantities import recorded_quantities
+from warp_mpm.quantities.time_series import OWN
 from warp_mpm.recording import (
     Checkpointer,
     Recorder,
     RunFolder,
+    Schedule,
+    SeriesInMemory,
     SnapshotRecorder,
+    SnapshotsInMemory,
     TimeSeriesRecorder,
     read_checkpoint,
     record_until,
     run_folder,
 )
 from warp_mpm.recording.checkpoint import Checkpoint, versions
-from warp_mpm.recording.chosen import recorded_quantities
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.surfaces import write_surfaces
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Scenario
+from warp_mpm.snapshot import Snapshot
 from warp_mpm.summary import summarize
 
 
@@ -67,6 +73,63 @@ class RunOutcome:
     """Key figures, as in summary.json."""
 
 
+@dataclass(frozen=True)
+class MemoryRun:
+    """A run that left nothing on the disk."""
+
+    scenario: Scenario
+    finished: bool
+    """False when it was stopped before its end."""
+    time_series: dict[str, NDArray[np.float64]]
+    """Columns by name, as of `Results.time_series`."""
+    snapshots: list[Snapshot]
+    """As of `Results.snapshots`, in double precision."""
+    summary: dict[str, Any]
+    """Key figures, as in summary.json."""
+
+
+def run_in_memory(
+    scenario: Scenario,
+    *,
+    make_simulation: Callable[[Scenario], Any],
+    recorders: Sequence[Recorder] = (),
+    on_progress: Callable[[RunProgress], None] | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> MemoryRun:
+    """Simulate a scenario as `run_scenario` does, and write nothing: the same steps, the same samples.
+
+    Args:
+        scenario: what to run.
+        make_simulation: as in `run_scenario`.
+        recorders: of your own, beside those of the run; they are closed at its end, however it ends.
+        on_progress: called after each record.
+        stop: asked between records; true ends the run cleanly before its time.
+
+    Raises:
+        Exception: whatever the simulation raises; your own recorders hold what was recorded until then.
+    """
+    started = time.perf_counter()
+    simulation = make_simulation(scenario)
+    output = scenario.output
+    series = SeriesInMemory(Schedule(output.time_series_interval_s), quantities=_asked(scenario))
+    snapshots = SnapshotsInMemory(Schedule(output.snapshot_interval_s))
+    all_recorders: list[Recorder] = [series, snapshots, *recorders]
+    report = _reporter(scenario, series, on_progress)
+    try:
+        finished = record_until(simulation, all_recorders, output.end_time_s, on_step=report, stop=stop)
+    finally:
+        _close(recorders)
+    record = simulation.record | {
+        "status": "finished" if finished else "stopped",
+        "material_points": simulation.material_points,
+        "wall_time": time.perf_counter() - started,
+    }
+    columns = series.series()
+    summary = summarize(scenario, columns, snapshots.snapshots, _of_the_run(record))
+    summary["notes"] = [*scene_caveats(scenario), *run_caveats(record, summary)]
+    return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary)
+
+
 def run_scenario(
     scenario: Scenario,
     out: str | Path,
@@ -74,6 +137,7 @@ def run_scenario(
     make_simulation: Callable[[Scenario], Any],
     force: bool = False,
     origin: str = "",
+    recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> RunOutcome:
@@ -87,6 +151,8 @@ def run_scenario(
         make_simulation: makes the simulation, for instance `lambda scenario: Simulation(scenario, device="cpu")`.
         force: an older run in `out` is replaced.
         origin: where the scenario came from, for the record.
+        recorders: of your own, beside those of the run; the simulation lands on their times too. They are closed at
+            the end of the run, however it ends.
         on_progress: called after each record.
         stop: asked between records; true ends the run cleanly before its time.
 
@@ -101,13 +167,14 @@ def run_scenario(
     simulation.prepare()
     record = _record(scenario, simulation, origin) | {"preparation_time": time.perf_counter() - preparing}
     with RunFolder.create(out, scenario.resolved(), record, force=force) as folder:
-        return _go_on(folder, scenario, simulation, record, on_progress, stop)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop)
 
 
 def resume_run(
     out: str | Path,
     *,
     make_simulation: Callable[[Scenario], Any],
+    recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> RunOutcome:
@@ -117,6 +184,7 @@ def resume_run(
     Args:
         out: the run folder.
         make_simulation: as in `run_scenario`.
+        recorders: as in `run_scenario`; they record where the run goes on, and from then on at their times.
         on_progress: as in `run_scenario`.
         stop: as in `run_scenario`.
 
@@ -159,7 +227,7 @@ def resume_run(
             "preparation_time": preparation_time,
         }
         record |= {"status": "running", "problem": None, "resumed": [*record.get("resumed", []), resumed]}
-        return _go_on(folder, scenario, simulation, record, on_progress, stop, checkpoint)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, checkpoint)
 
 
 def _go_on(
@@ -167,6 +235,7 @@ def _go_on(
     scenario: Scenario,
     simulation: Any,
     record: dict[str, Any],
+    own: Sequence[Recorder],
     on_progress: Callable[[RunProgress], None] | None,
     stop: Callable[[], bool],
     checkpoint: Checkpoint | None = None,
@@ -184,13 +253,13 @@ def _go_on(
         series = TimeSeriesRecorder(
             out / run_folder.TIME_SERIES,
             output.time_series_interval_s,
-            quantities=None if output.quantities is None else recorded_quantities(scenario),
+            quantities=_asked(scenario),
             mark=marks.get("time_series"),
         )
     except RunFolderError:
         snapshots.close()
         raise
-    recorders: list[Recorder] = [series, snapshots]
+    recorders: list[Recorder] = [series, snapshots, *own]
     if checkpoint is not None:
         folder.write(run_folder.RECORD, record)
     checkpointer = Checkpointer(
@@ -201,29 +270,22 @@ def _go_on(
         wall_before=wall_before,
     )
 
-    first: list[float] = []
-
-    def report(simulated: Any) -> None:
-        now, wall = simulated.time, time.perf_counter()
-        first.extend([] if first else [now, wall])
-        rate = (now - first[0]) / (wall - first[1]) if now > first[0] else None
-        if on_progress is not None:
-            on_progress(RunProgress(now, end_time, rate, series.latest))
-
     status, problem = "failed", None
     try:
         finished = record_until(
-            simulation, recorders, end_time, on_step=report, stop=stop, after_records=checkpointer.after_records
+            simulation,
+            recorders,
+            end_time,
+            on_step=_reporter(scenario, series, on_progress),
+            stop=stop,
+            after_records=checkpointer.after_records,
         )
         status = "finished" if finished else "stopped"
     except Exception as error:
         problem = str(error)
         raise
     finally:
-        for recorder in recorders:
-            # A disk that is full must not hide the error that tells so.
-            with contextlib.suppress(OSError):
-                recorder.close()
+        _close(recorders)
         ended = {
             "status": status,
             "problem": problem,
@@ -240,6 +302,40 @@ def _go_on(
     return outcome
 
 
+class _Series(Protocol):
+    @property
+    def latest(self) -> dict[str, float]:
+        """The last sample."""
+
+
+def _reporter(
+    scenario: Scenario, series: _Series, on_progress: Callable[[RunProgress], None] | None
+) -> Callable[[Any], None]:
+    """Tells where a run stands, after each stretch."""
+    first: list[float] = []
+
+    def report(simulated: Any) -> None:
+        now, wall = simulated.time, time.perf_counter()
+        first.extend([] if first else [now, wall])
+        rate = (now - first[0]) / (wall - first[1]) if now > first[0] else None
+        if on_progress is not None:
+            on_progress(RunProgress(now, scenario.output.end_time_s, rate, series.latest))
+
+    return report
+
+
+def _close(recorders: Sequence[Recorder]) -> None:
+    """A disk that is full must not hide the error that tells so."""
+    for recorder in recorders:
+        with contextlib.suppress(OSError):
+            recorder.close()
+
+
+def _asked(scenario: Scenario) -> list[str] | None:
+    """Keys of the quantities that are sampled; None for all."""
+    return None if scenario.output.quantities is None else recorded_quantities(scenario)
+
+
 def evaluate(path: str | Path) -> dict[str, Any]:
     """Write the summary and the figures of a run folder from its records, and return the summary.
 
@@ -249,10 +345,8 @@ def evaluate(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
-    taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
     with results.snapshots as snapshots:
-        of_the_run = {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
-        summary = summarize(results.scenario, results.time_series, snapshots, of_the_run)
+        summary = summarize(results.scenario, results.time_series, snapshots, _of_the_run(record))
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
@@ -283,6 +377,12 @@ def _write_surfaces(results: Results, path: Path) -> None:
         write_surfaces(results.scenario, snapshots.times.tolist(), displacements, extent, path / run_folder.SURFACES)
 
 
+def _of_the_run(record: dict[str, Any]) -> dict[str, Any]:
+    """What a summary takes over from a run's record."""
+    taken_over = ("status", "material_points", "steps", "wall_time", "time_step_min", "time_step_max")
+    return {name: record.get(name) for name in taken_over} | {"time_step_limit": _ruling_limit(record)}
+
+
 def _ruling_limit(record: dict[str, Any]) -> str | None:
     """The limit that set most time steps; None before the first."""
     prefix = "steps_limited_by_"
@@ -305,10 +405,18 @@ def _record(scenario: Scenario, simulation: Any, origin: str) -> dict[str, Any]:
         "device": str(simulation.device),
         "material_points": simulation.material_points,
         **({"effects": asdict(simulation.effects)} if hasattr(simulation, "effects") else {}),
+        **_own_quantities(scenario),
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": used,
         **_commit(),
     }
+
+
+def _own_quantities(scenario: Scenario) -> dict[str, Any]:
+    """What a script says of the quantities that it registered, for whoever reads the run without it."""
+    said = ("unit", "meaning", "label", "symbol")
+    own = {name: {part: getattr(one, part) for part in said} for name, one in OWN.items() if one.there(scenario)}
+    return {"quantities": own} if own else {}
 
 
 def _commit() -> dict[str, Any]:

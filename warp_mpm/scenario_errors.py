@@ -218,6 +218,9 @@ def _range_of(annotation: Any, prefix: str = "") -> str:
         words = "a text" + (" of at least one character" if any(isinstance(c, MinLen) for c in constraints) else "")
     elif _is_model(bare):
         words = f"a group of the fields {', '.join(bare.model_fields)}"
+    elif typing.get_origin(bare) in (dict, list):
+        words = "a group of fields" if typing.get_origin(bare) is dict else "a list"
+        words += " with at least one entry" if any(isinstance(c, MinLen) for c in constraints) else ""
     elif typing.get_origin(bare) is tuple:
         arguments = typing.get_args(bare)
         many = Ellipsis in arguments

@@ -23,6 +23,7 @@ from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.cache import initialize_warp, load_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
+from .quantities.time_series import OWN
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
 from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of
@@ -32,7 +33,7 @@ from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.parameters import kernel_parameters
-from .state.samples import OF_THE_LEDGER, BarrierNow, Constants, Window, sample
+from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
 __all__ = ["Simulation", "SimulationDiverged"]
@@ -221,7 +222,7 @@ class Simulation:
         self._kernels_of_a_step: tuple[str, ...] = ()
         self._ledger_graph: Any = None
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
-        self._constants = Constants(self.effects, self.bodies, self._barrier, scenario.gravity.vector)
+        self._quantities = sampled_quantities(scenario, self.bodies)
         self._since = self.window()
         """When the last call of `advance` that made a step began."""
         flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
@@ -600,41 +601,57 @@ class Simulation:
             SimulationDiverged: some quantity of a material point, or of the sample, is not a finite number; not every
                 point is looked at where no sum over them is formed.
         """
-        if names is None or not OF_THE_LEDGER.isdisjoint(names):
+        wanted = wanted_quantities(self._quantities, names)
+        sums = [0.0] * at.LEDGER_SIZE
+        if any(quantity.of_points for quantity in wanted):
             if self._ledger_graph is None:
                 self._ledger_graph = self._captured(self._sum_up)
             wp.capture_launch(self._ledger_graph)
             sums = self._read("sums").tolist()
             if sums[at.LEDGER_NOT_FINITE] > 0.0:
                 raise SimulationDiverged(self._what_diverged())
-        else:
-            sums = [0.0] * at.LEDGER_SIZE
+        now = self._now(self.window(), self._since if since is None else since, sums)
+        values = {}
+        for quantity in wanted:
+            values[quantity.key] = value = float(quantity.read(now))
+            if not math.isfinite(value):
+                if quantity.key in OWN:
+                    raise ValueError(
+                        f"the quantity {quantity.key} is {value:g} at t = {self.time:.6g} s; it must be a finite number"
+                    )
+                raise SimulationDiverged(
+                    what_is_no_number(quantity.key, value, time=self.time, steps=self.steps, scenario=self.scenario)
+                )
+        return values if names is None else {key: values[key] for key in values if key == "time" or key in names}
+
+    def _now(self, now: Window, since: Window, sums: Sequence[float]) -> Now:
         barrier = BarrierNow()
         if self._barrier is not None:
+            motion = self.bodies[self._barrier].motion
             barrier = BarrierNow(
                 self.body_displacement(BARRIER)[0],
                 self.body_velocity(BARRIER)[0],
                 self._barrier_number("work"),
                 self._barrier_number("base_work"),
+                motion.mass if isinstance(motion, Sliding) else 0.0,
             )
-        values = sample(
-            self._constants,
-            self.window(),
-            self._since if since is None else since,
+        forces, base_force = mean_forces(self.bodies, now, since)
+        return Now(
+            scenario=self.scenario,
+            bodies=self.bodies,
             barrier=barrier,
-            balance=self._read("balance").tolist(),
-            clock=self._read("clock").tolist(),
-            sums=sums,
-            left=self._read("left").tolist(),
+            time=self.time,
+            time_step=self._clock_entry(at.TIME_STEP),
+            elapsed=now.time - since.time,
+            forces=forces,
+            base_force=base_force,
+            impulses=now.reactions,
             initial_momentum=self._initial_momentum,
+            points=self.points,
+            sums=sums,
+            departed=self._read("left").tolist(),
+            balanced=self._read("balance").tolist(),
         )
-        values["time"] = self.time
-        for name, value in values.items():
-            if not math.isfinite(value):
-                raise SimulationDiverged(
-                    what_is_no_number(name, value, time=self.time, steps=self.steps, scenario=self.scenario)
-                )
-        return values if names is None else {name: values[name] for name in values if name == "time" or name in names}
 
     @property
     def record(self) -> dict[str, Any]:

@@ -10,10 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.force_record import (
-    END_SHARE,
-    FILTER_WINDOW,
-    RESIDUAL_SHARE,
-    SETTLED_SHARE,
     START_SHARE,
     cumulative_impulse,
     filtered_peak,
@@ -22,55 +18,25 @@ from analytic.force_record import (
     still_rises,
 )
 from warp_mpm import mechanism
-from warp_mpm.recording.chosen import left_out
+from warp_mpm.quantities import left_out
+from warp_mpm.quantities.figures import FIGURES, NEEDED
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import ResultsError, Snapshots
 from warp_mpm.scenario import Scenario, Sliding
+from warp_mpm.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
 
-DEFINITIONS = {
-    "peak_force": "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
-    "its time is the end of that interval; where force_still_rises, that so far, at least",
-    "peak_force_filtered": f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
-    "force_still_rises": "whether that moving mean is greatest where the run ends; null without an impact",
-    "impact_start_time": f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
-    "rise_time": "T1: peak_force_filtered_time less impact_start_time; null where force_still_rises",
-    "residual_force": f"mean force over the last {RESIDUAL_SHARE:.0%} of the run",
-    "impact_end_time": (
-        "first time after the peak from which the filtered force, less the residual force, stays below "
-        f"{END_SHARE:.0%} of the filtered peak less the residual force; null where that is only in the last "
-        f"{RESIDUAL_SHARE:.0%} of the run, or the force has not settled by then: residual_force is above "
-        f"{SETTLED_SHARE:.0%} of the filtered peak and, at the rate of its last change, would change by more than "
-        f"{END_SHARE:.0%} of that peak in as long as the impact has lasted"
-    ),
-    "impact_duration": "T2: impact_end_time less impact_start_time",
-    "impulse": "time integral of the horizontal force on the impacted face over the whole run",
-    "impact_impulse": "the same from impact_start_time to impact_end_time",
-    "barrier_velocity_max": "greatest velocity downstream; 0 of a barrier that only slides upstream",
-    "barrier_displacement_final": "at the end of the run; not final unless barrier_at_rest",
-    "pore_pressure_max": (
-        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
-        "noise about the mean over a cell"
-    ),
-    "pore_pressure_max_anywhere": "greatest pore pressure of any single material point, noise and jets included",
-    "retained_volume": "material upstream of the crest at the end, at the flow's initial density",
-    "on_crest_volume": "material above the crest at the end",
-    "overtopped_volume": "material beyond the crest at the end; left_volume is what has left the domain",
+DEFINITIONS = {name: figure.meaning for name, figure in FIGURES.items()} | {
     "mechanism": mechanism.RULE,
     "notes": "what must be known before the scene and its figures are trusted",
-    "mass_error": "greatest change of the mass of both phases, inside and departed together, over the initial mass",
-    "momentum_error": "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
-    "momentum and the impulse of its weight",
-    "energy_error": "greatest energy that appeared beyond what was there at the start less the work done on the "
-    "barrier and beyond gravity's work on liquid that seeps, over the flow's initial energy; plastic flow and drag "
-    "only take energy away",
 }
-"""How each figure that could be understood in several ways is taken."""
+"""How each figure is taken."""
 
 
 def summarize(
-    scenario: Scenario, series: Series, snapshots: Snapshots | None, run: Mapping[str, Any]
+    scenario: Scenario, series: Series, snapshots: Sequence[Snapshot] | Snapshots | None, run: Mapping[str, Any]
 ) -> dict[str, Any]:
     """All key figures of a run that may have ended at any moment; one that the scene does not have, or that was not
     reached, is None.
@@ -103,6 +69,10 @@ def summarize(
     if snapshots is not None and len(snapshots) > 0:
         figures |= mechanism.deposit(scenario, snapshots[-1])
         figures["mechanism"], figures["mechanism_measures"] = mechanism.impact_mechanism(scenario, snapshots)
+    for name in series:
+        if name not in NAMED:  # of a script, or on a script's body: `quantities.SUMMED_UP`
+            (figures[f"{name}_max"], figures[f"{name}_max_time"]), values = _peak(series, name), series[name]
+            figures[f"{name}_final"] = float(values[-1])
     unknown = not_recorded(scenario)
     errors: dict[str, Callable[[], float | None]] = {
         "mass_error": lambda: mass_error(series),
@@ -117,33 +87,6 @@ def summarize(
             raise ResultsError(f"{name} is {value}; every figure of a run must be a finite number.")
     figures["definitions"] = DEFINITIONS
     return figures
-
-
-NEEDED = {
-    "peak_force": ("impact_force_x",),
-    "peak_force_filtered": ("impact_force_x",),
-    "impulse": ("impact_force_x",),
-    "impact_start_time": ("impact_force_x",),
-    "rise_time": ("impact_force_x",),
-    "impact_duration": ("impact_force_x",),
-    "impact_impulse": ("impact_force_x",),
-    "residual_force": ("impact_force_x",),
-    "pore_pressure_max": ("pore_pressure_max",),
-    "pore_pressure_max_anywhere": ("pore_pressure_max_anywhere",),
-    "barrier_velocity_max": ("barrier_velocity",),
-    "barrier_velocity_final": ("barrier_velocity",),
-    "barrier_at_rest": ("barrier_velocity",),
-    "barrier_displacement_final": ("barrier_displacement",),
-    "mass_error": ("solid_mass", "liquid_mass", "left_mass"),
-    "momentum_error": (
-        *("momentum_residual_x", "momentum_residual_y", "momentum_x", "momentum_y", "solid_mass", "liquid_mass"),
-    ),
-    "energy_error": (
-        *("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy"),
-        *("left_energy", "barrier_work", "seepage_work"),
-    ),
-}
-"""Quantities of the time series that a figure is taken from."""
 
 
 def not_recorded(scenario: Scenario) -> dict[str, list[str]]:

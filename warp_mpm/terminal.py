@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -14,8 +15,11 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from analytic.command_line import other_ends
 from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.description import described
+from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
 from warp_mpm.run import RunOutcome, RunProgress
 from warp_mpm.scenario import Scenario
@@ -28,14 +32,16 @@ PLAIN_LINES = 10
 
 
 class StopOnSignal:
-    """Ctrl-C and termination ask the run to stop after its present interval; a second Ctrl-C ends it at once."""
+    """Ctrl-C, termination and a terminal that is closed ask the run to stop after its present steps; a second Ctrl-C
+    ends it at once, and so does the first while nothing has been computed."""
 
     def __init__(self) -> None:
         self.received = False
+        self._nothing_to_lose = False
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, *other_ends()):
             self._before[number] = signal.signal(number, self._receive)
         return self
 
@@ -45,8 +51,17 @@ class StopOnSignal:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Around what may be broken off: kernels take half a minute to compile."""
+        self._nothing_to_lose = True
+        try:
+            yield
+        finally:
+            self._nothing_to_lose = False
+
     def _receive(self, number: int, frame: FrameType | None) -> None:
-        if self.received:
+        if self.received or self._nothing_to_lose:
             raise KeyboardInterrupt
         self.received = True
 
@@ -116,50 +131,51 @@ class RunDisplay:
 def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and value, with unit, of the figures that a person wants first; those that are None are left out."""
 
-    def kilo(name: str, unit: str, at: str | None = None) -> str | None:
+    def told(name: str, form: str = ",.1f", at: str | None = None) -> str | None:
         value = summary.get(name)
         if value is None:
             return None
         moment = summary.get(at) if at is not None else None
-        return f"{value / 1e3:,.1f} {unit}" + (f" at {moment:.3f} s" if moment is not None else "")
-
-    def plain(name: str, unit: str, digits: int = 2) -> str | None:
-        value = summary.get(name)
-        return None if value is None else f"{value:,.{digits}f} {unit}"
+        return FIGURES[name].text(value, form) + (f" at {moment:.3f} s" if moment is not None else "")
 
     def relative(name: str) -> str | None:
         value = summary.get(name)
         return None if value is None else f"{value:.1e}"
 
     volumes = [
-        f"{summary[f'{name}_volume']:.1f} {word}"
-        for name, word in (("retained", "retained"), ("on_crest", "on the crest"), ("overtopped", "beyond"))
-        if summary.get(f"{name}_volume") is not None
+        f"{summary[name]:.1f} {FIGURES[name].short}"
+        for name in ("retained_volume", "on_crest_volume", "overtopped_volume")
+        if summary.get(name) is not None
     ]
+
+    def words(name: str) -> str:
+        return FIGURES[name].words
+
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
-        ("peak force F₂ₓ, 0.05 s mean", kilo("peak_force_filtered", "kN/m", "peak_force_filtered_time")),
-        ("  over one record", kilo("peak_force", "kN/m", "peak_force_time")),
-        ("impulse", kilo("impulse", "kN s/m")),
-        ("impact from", plain("impact_start_time", "s", 3)),
-        ("rise time T₁, duration T₂", _times(summary)),
-        ("pore pressure, greatest", kilo("pore_pressure_max", "kPa", "pore_pressure_max_time")),
+        (words("peak_force_filtered"), told("peak_force_filtered", at="peak_force_filtered_time")),
+        ("  over one record", told("peak_force", at="peak_force_time")),
+        (words("impulse"), told("impulse")),
+        (words("impact_start_time"), told("impact_start_time", ",.3f")),
+        (
+            f"{words('rise_time')} {FIGURES['rise_time'].symbol}, duration {FIGURES['impact_duration'].symbol}",
+            _times(summary),
+        ),
+        (words("pore_pressure_max"), told("pore_pressure_max", at="pore_pressure_max_time")),
         (
             "  at a single point, noise and all",
-            kilo("pore_pressure_max_anywhere", "kPa", "pore_pressure_max_anywhere_time"),
+            told("pore_pressure_max_anywhere", at="pore_pressure_max_anywhere_time"),
         ),
-        ("barrier velocity, greatest", plain("barrier_velocity_max", "m/s")),
-        ("barrier displacement", displacement(summary)),
-        ("volume [m³/m]", ", ".join(volumes) or None),
+        (words("barrier_velocity_max"), told("barrier_velocity_max", ",.2f")),
+        (words("barrier_displacement_final"), displacement(summary)),
+        (f"volume [{FIGURES['retained_volume'].shown_unit}]", ", ".join(volumes) or None),
         ("mechanism seen so far" if impact_goes_on(summary) else "mechanism seen", summary.get("mechanism")),
-        ("error of mass", relative("mass_error")),
-        ("error of momentum", relative("momentum_error")),
-        ("energy created", relative("energy_error")),
+        *((words(name), relative(name)) for name in ("mass_error", "momentum_error", "energy_error")),
         (
             "time steps",
             None if smallest is None else f"{summary['steps']:,}, smallest {smallest:.2e} s, mostly limited by {limit}",
         ),
-        ("wall time", plain("wall_time", "s", 1)),
+        (words("wall_time"), told("wall_time")),
     ]
     return [(name, value) for name, value in rows if value is not None]
 
@@ -170,7 +186,8 @@ def displacement(summary: Mapping[str, Any]) -> str | None:
     if value is None:
         return None
     still = summary.get("barrier_at_rest") is False
-    return f"{value:,.3f} m" + (f", still sliding at {summary['barrier_velocity_final']:.3g} m/s" if still else "")
+    told = FIGURES["barrier_displacement_final"].text(value, ",.3f")
+    return told + (f", still sliding at {summary['barrier_velocity_final']:.3g} m/s" if still else "")
 
 
 AT_LEAST = "≥ before Δx: the barrier still slides at the end of the run."
@@ -197,8 +214,7 @@ def _state(progress: RunProgress) -> str:
     parts = [f"t = {progress.time:.2f} of {progress.end_time:g} s"]
     if left is not None:
         parts += [f"{progress.rate:.3g} s/s", f"{int(left) // 60}:{int(left) % 60:02d} left"]
-    if "impact_force_x" in progress.sample:
-        parts.append(f"F₂ₓ = {progress.sample['impact_force_x'] / 1e3:.0f} kN/m")
-    if "barrier_velocity" in progress.sample:
-        parts.append(f"v₂ = {progress.sample['barrier_velocity']:.2f} m/s")
+    for name, form in (("impact_force_x", ".0f"), ("barrier_velocity", ".2f")):
+        if name in progress.sample:
+            parts.append(f"{NAMED[name].symbol} = {NAMED[name].text(progress.sample[name], form)}")
     return "  ".join(parts)

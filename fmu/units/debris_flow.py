@@ -11,14 +11,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from warp_mpm.quantities.time_series import NAMED
+
 from .interface import (
     CUBIC_METRE_PER_METRE,
-    JOULE_PER_METRE,
     METRE,
     METRE_PER_SECOND,
     NEWTON_PER_METRE,
-    PASCAL,
     SECOND,
+    UNITS,
     Choice,
     Interface,
     Unit,
@@ -46,6 +47,13 @@ def _force(name: str, description: str) -> Variable:
 
 def _output(name: str, description: str, unit: Unit, nominal: float = 1.0, minimum: float | None = None) -> Variable:
     return Variable(name, "output", description, unit=unit, nominal=nominal, minimum=minimum)
+
+
+def _recorded(name: str, nominal: float = 1.0, minimum: float | None = None) -> Variable:
+    """A quantity of the simulator's time series; its interval is here the step."""
+    quantity = NAMED[name]
+    meaning = quantity.meaning.replace("interval", "step")
+    return _output(name, meaning[0].upper() + meaning[1:], UNITS[quantity.unit], nominal, minimum)
 
 
 INTERFACE = Interface(
@@ -98,15 +106,15 @@ INTERFACE = Interface(
             maximum=1e9,
             nominal=1e5,
         ),
-        _force("impact_force_x", "Force F_2 of the flow on the barrier's face along x, mean over the step"),
-        _force("impact_force_y", "Force F_2 of the flow on the barrier's face along y, upward, mean over the step"),
-        _force("top_force", "Force F_3 of the flow on the barrier's crest along x, mean over the step"),
+        _recorded("impact_force_x", 1e5),
+        _recorded("impact_force_y", 1e5),
+        _recorded("top_force", 1e5),
         _force("barrier_force", "Force of the flow on all of the barrier along x, mean over the step"),
         _force("vertical_load", "Downward force of the flow on all of the barrier, mean over the step"),
-        _output("barrier_velocity", "Velocity v2 of the barrier", METRE_PER_SECOND),
-        _output("barrier_displacement", "Displacement of the barrier since the start", METRE),
-        _output("pore_pressure_max", "Largest pore pressure in the flow", PASCAL, 1e5),
-        _output("flow_kinetic_energy", "Kinetic energy of the flow per metre of width", JOULE_PER_METRE, 1e6, 0.0),
+        _recorded("barrier_velocity"),
+        _recorded("barrier_displacement"),
+        _recorded("pore_pressure_max", 1e5),
+        _recorded("flow_kinetic_energy", 1e6, 0.0),
         _output("overtopped_volume", "Volume of the flow beyond the crest per metre", CUBIC_METRE_PER_METRE, 10.0, 0.0),
         Variable("time_ratio", "output", "Simulated time over wall time since the start", minimum=0.0),
         Variable("message", "output", "What went wrong, in one sentence; empty while all is well", "String"),

@@ -35,6 +35,8 @@ NEWTON_PER_SQUARE_METRE = Unit("N/m2", kg=1, m=-1, s=-2, display_name="kN/m2", d
 JOULE_PER_METRE = Unit("J/m", kg=1, m=1, s=-2, display_name="kJ/m", display_factor=1e-3)
 PASCAL = Unit("Pa", kg=1, m=-1, s=-2, display_name="kPa", display_factor=1e-3)
 CUBIC_METRE_PER_METRE = Unit("m3/m", m=2)
+UNITS = {unit.name: unit for unit in (METRE, METRE_PER_SECOND, NEWTON_PER_METRE, JOULE_PER_METRE, PASCAL)}
+"""Units of the simulator's quantities, by name."""
 DEGREE = Unit("deg", rad=1, factor=math.pi / 180)
 
 

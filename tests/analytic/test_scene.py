@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from analytic.cli import app as closed_form
 from analytic.scene import SceneError, read_scene, scene_of
-from fmu.__main__ import app as fmu
+from fmu.cli import app as fmu
 from warp_mpm.scenario import Scenario, Trapezoid
 from warp_mpm.scenario_errors import ScenarioError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typer.testing import CliRunner
 
 from analytic.command_line import BAD_INPUT
-from fmu.__main__ import app
+from fmu.cli import app
 
 
 def test_every_unit_has_its_line() -> None:

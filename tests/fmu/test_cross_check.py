@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from fmu import archive, c_unit
-from fmu.__main__ import app
+from fmu.cli import app
 from fmu.cross_check import CrossCheck, cross_check
 from warp_mpm import Scenario
 

@@ -15,7 +15,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
-from warp_mpm.accuracy import purchase
+from warp_mpm.accuracy import keys, purchase
 from warp_mpm.accuracy.check import Check, drawn, holds, table
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.formulas import formulas
@@ -166,6 +166,12 @@ class TestKeys:
         turned = scene.model_copy(update={"numerics": NumericsWithMore(**settings, more=1.0)})
         assert run_key(plain) == run_key(scene)
         assert run_key(turned) != run_key(scene)
+
+    def test_numbers_of_another_program_are_others(self, scene: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+        own, place = run_key(scene), scene_key(scene)
+        monkeypatch.setattr(keys, "program_digest", lambda: "other")
+        assert run_key(scene) != own
+        assert scene_key(scene) == place
 
     def test_default_that_changes_changes_the_key(self, scene: Scenario) -> None:
         class OtherDefault(type(scene.numerics)):  # type: ignore[misc]

@@ -134,16 +134,28 @@ class TestTwoDevices:
         assert table.rows[0][-1] == "agrees"
 
     def test_a_device_that_is_off_by_a_millionth_differs(self, one_scene, monkeypatch):
-        true_run = two_devices._run
+        """In any figure; of the force also where its impulse is right."""
+        found = {nudged: two_devices._run(one_scene, "cpu", nudge=2.0**-50 * nudged) for nudged in (False, True)}
+        force = found[False]["impact_force_x"]
+        moved = force.copy()
+        moved[[-2, -20]] += 1e-6 * force.max() * np.array([1.0, -1.0])
+        names = ("impact_force_x", "flow_kinetic_energy")
+        changes = [{"impact_force_x": moved}, *({name: found[False][name] * (1.0 + 1e-6)} for name in names)]
+        # A barrier that has just begun to slide tells less: how far hangs on the last digit.
+        changes.append({"barrier_displacement": found[False]["barrier_displacement"] + 1e-3})
+        for change in changes:
 
-        def run(scene, device, *, nudge=0.0):
-            found = true_run(scene, "cpu", nudge=nudge)
-            return found if device == "cpu" else found | {"impact_force_x": found["impact_force_x"] * (1.0 + 1e-6)}
+            def run(scene, device, *, nudge=0.0, there=found[False] | change):
+                return found[nudge > 0.0] if device == "cpu" else there
 
-        monkeypatch.setattr(two_devices, "_run", run)
-        table, agree = two_devices.agreement(one_scene, device="cuda:0", progress=lambda name: None)
-        assert not agree
-        assert table.rows[0][-1] == "DIFFERS"
+            monkeypatch.setattr(two_devices, "_run", run)
+            table, agree = two_devices.agreement(one_scene, device="cuda:0", progress=lambda name: None)
+            assert not agree, change.keys()
+            assert table.rows[0][-1] == "DIFFERS"
+
+    def test_a_device_that_loses_mass_differs(self, one_scene, monkeypatch):
+        monkeypatch.setattr(two_devices, "_ledger", lambda scene, run: [0.0, 1e-6])
+        assert not two_devices.agreement(one_scene, device="cpu", progress=lambda name: None)[1]
 
     def test_figures_that_are_no_numbers_differ(self):
         right = {

@@ -66,7 +66,7 @@ def test_a_slip_is_told(load_scene, changes, words):
          "flow.velocity_m_per_s": [-15.0, 0.0]},  # a barrier that runs after the flow
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0, 2.0], "velocities_m_per_s": [30.0, 0.0]}},
         # The barrier slides down to a flow that stays where it is, held by the ground.
-        {"gravity.tilt_deg": -30.0, "flow.shape.distance_m": 20.0, "flow.velocity_m_per_s": [0.0, 0.0],
+        {"gravity.tilt_deg": -30.0, "flow.shape.distance_m": 40.0, "flow.velocity_m_per_s": [0.0, 0.0],
          "ground.friction": 1.0},
         {"flow.lateral_stress_coefficient": 10, "flow.initial_stress": "zero"},
         {"flow.lateral_stress_coefficient": 3, "flow.material.cohesion_Pa": 1e5},

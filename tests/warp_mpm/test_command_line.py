@@ -10,11 +10,11 @@ from typer.models import ParameterInfo
 from typer.testing import CliRunner
 
 import analytic.cli
-import fmu.__main__
+import fmu.cli
 import warp_mpm.cli
 
 SCENES = Path(__file__).parents[2] / "scenarios"
-APPLICATIONS = {"warp_mpm": warp_mpm.cli.app, "analytic": analytic.cli.app, "fmu": fmu.__main__.app}
+APPLICATIONS = {"warp_mpm": warp_mpm.cli.app, "analytic": analytic.cli.app, "fmu": fmu.cli.app}
 
 
 def commands(app, *before):

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.run_folder import RunFolderError
-from warp_mpm.results import Results, ResultsError
+from warp_mpm.results import SUMMARY_KINDS, Results, ResultsError, read_time_series
 from warp_mpm.run import evaluate, resume_run, run_scenario
 from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError
@@ -211,6 +211,8 @@ def test_names_in_a_scenario_lead_nowhere(tmp_path, coarse_case_1, flying_points
         ("wall_time", "1", 'wall_time = "1" must be a number'),
         ("steps", True, "steps = true must be a whole number"),
         ("time_step_min", float("nan"), "time_step_min = NaN must be null or a number"),
+        ("effects", {"precision": "float16"}, 'effects.precision = "float16" must be float64 or float32'),
+        ("effects", {"precision": 3}, "effects.precision = 3 must be float64 or float32"),
     ],
 )
 def test_a_record_of_the_wrong_kind_is_one_sentence(tmp_path, stopped, name, value, words):
@@ -222,3 +224,49 @@ def test_a_record_of_the_wrong_kind_is_one_sentence(tmp_path, stopped, name, val
     (folder / run_folder.RECORD).write_text(json.dumps(record | {name: value}))
     with pytest.raises(ResultsError, match=rf"run.json is damaged: {words}\.$"):
         resume_run(folder, make_simulation=unmade)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("peak_force", "x", 'peak_force = "x" must be null or a number'),
+        ("impulse", float("inf"), "impulse = Infinity must be null or a number"),
+        ("steps", True, "steps = true must be null or a number"),
+        ("mechanism", 3, "mechanism = 3 must be a text or null"),
+        ("barrier_at_rest", 1, "barrier_at_rest = 1 must be true or false or null"),
+        ("notes", "none", 'notes = "none" must be a list'),
+        ("front_max", "far", 'front_max = "far" must be null or a number'),  # of a script's quantity
+    ],
+)
+def test_a_summary_of_the_wrong_kind_is_one_sentence(tmp_path, name, value, words):
+    (tmp_path / run_folder.RECORD).write_text(json.dumps({"format": run_folder.FORMAT}))
+    (tmp_path / run_folder.SUMMARY).write_text(json.dumps({"peak_force": None, "grown": "since", name: value}))
+    with pytest.raises(ResultsError, match=rf"summary.json is damaged: {words}\.$"):
+        Results.open(tmp_path).summary  # noqa: B018
+
+
+def test_every_figure_of_a_summary_has_its_kind(coarse_case_1, flying_points, tmp_path):
+    summary = run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points).summary
+    assert Results.open(tmp_path / "run").summary == summary
+    assert summary.keys() <= SUMMARY_KINDS.keys() | {"not_recorded"}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("impact_force_x [N/m]\n1\n2\n", r"has no column 'time \[s\]'"),
+        ("time [s],time [s]\n1,1\n2,2\n", "has the column 'time' twice"),
+        ("time [s]\n0\n1\n1\n2\n", "line 4: time does not increase"),
+        ("time [s]\n0\n2\n1\n", "line 4: time does not increase"),
+    ],
+)
+def test_a_series_that_no_run_writes_is_one_sentence(tmp_path, text, words):
+    (tmp_path / "timeseries.csv").write_text(text)
+    with pytest.raises(ResultsError, match=rf"timeseries.csv {words}\.$"):
+        read_time_series(tmp_path / "timeseries.csv")
+
+
+def test_a_series_that_a_spreadsheet_has_saved_is_read(tmp_path):
+    (tmp_path / "timeseries.csv").write_bytes(b"\xef\xbb\xbftime [s],impact_force_x [N/m]\r\n0,1\r\n1,2\r\n")
+    found = read_time_series(tmp_path / "timeseries.csv")
+    assert {name: values.tolist() for name, values in found.items()} == {"time": [0, 1], "impact_force_x": [1, 2]}

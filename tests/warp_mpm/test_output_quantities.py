@@ -7,15 +7,14 @@ import pytest
 
 from warp_mpm.caveats import run_caveats
 from warp_mpm.plotting import comparison, force_and_displacement
-from warp_mpm.quantities import TIME_SERIES
-from warp_mpm.recording.chosen import quantities_of, recorded_quantities
+from warp_mpm.quantities import TIME_SERIES, quantities_of, recorded_quantities
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.run import resume_run, run_scenario
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
-from warp_mpm.state.samples import OF_THE_LEDGER
 from warp_mpm.summary import not_recorded, summarize
 
+OF_THE_LEDGER = {key for key, quantity in TIME_SERIES.items() if quantity.of_points}
 COARSE = {"numerics.spacing_m": 0.75, "output.end_time_s": 0.6}
 SCENES = {
     "case_1": {}, "case_1_dry": {}, "case_1_undrained": {}, "case_1_fixed": {}, "case_5": {},

@@ -108,7 +108,7 @@ def test_time_series_keeps_all_digits_and_names_units(tmp_path):
 
 
 def test_columns_promised_to_users():
-    labels = {quantity.label for quantity in TIME_SERIES.values()}
+    labels = {quantity.heading for quantity in TIME_SERIES.values()}
     assert labels >= {
         "time [s]",
         "impact_force_x [N/m]",
@@ -126,7 +126,7 @@ def test_columns_promised_to_users():
 def test_quantity_without_a_unit_is_refused(tmp_path):
     clock = Clock()
     clock.sample = lambda names, *, since: {"time": 0.0, "mystery": 1.0}
-    with pytest.raises(KeyError, match="No unit is registered for mystery"):
+    with pytest.raises(KeyError, match="No unit is known for mystery"):
         TimeSeriesRecorder(tmp_path / "series.csv", 0.1).record(clock)
 
 

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import analytic.cli
-import fmu.__main__
+import fmu.cli
 import warp_mpm.cli
 from analytic.version import PROJECT
 from warp_mpm import extras
@@ -87,7 +87,7 @@ def test_a_scene_that_is_not_there_is_told_where_to_get(tmp_path):
     assert "comes with" not in str(other.value)
 
 
-@pytest.mark.parametrize("app", [warp_mpm.cli.app, analytic.cli.app, fmu.__main__.app])
+@pytest.mark.parametrize("app", [warp_mpm.cli.app, analytic.cli.app, fmu.cli.app])
 def test_version(app):
     answer = CliRunner().invoke(app, ["--version"])
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]

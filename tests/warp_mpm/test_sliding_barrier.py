@@ -1,8 +1,12 @@
 """The barrier's equation of motion: stick and slip, momentum, and its coupling with the flow."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from warp_mpm.scenario import json_schema
 from warp_mpm.simulation import Simulation
 
 INTERVAL = 0.01
@@ -150,3 +154,11 @@ def test_on_a_slope_that_falls_upstream_its_weight_pulls_it_there(load_scene):
     pull = 9.81 * (np.sin(np.radians(30.0)) - 0.29 * np.cos(np.radians(30.0)))
     assert simulation.barrier_velocity == pytest.approx(-0.2 * pull, rel=1e-9)
     assert simulation.barrier_displacement == pytest.approx(-0.02 * pull, rel=1e-9)
+
+
+def test_schema_and_page_say_so():
+    description = json.loads(json_schema())["$defs"]["Sliding"]["description"]
+    assert "to either side" in description
+    assert "upstream where the ground falls that way" in " ".join(description.split())
+    page = (Path(__file__).parents[2] / "docs" / "how_to" / "barriers.md").read_text()
+    assert "barrier slides upstream, and its displacement is negative" in " ".join(page.split())

@@ -112,6 +112,16 @@ def test_distributions_have_their_moments(load, distribution, mean, deviation):
             r"range = \[0.3, 0.6\] is not allowed; it must be a list of 3 numbers: first, last and number of evenly",
         ),
         (sweep_of("grid", {SPEED: {"range": [1, 2, 3, 4]}}), r"list of 3 numbers: first, last and number of evenly"),
+        (
+            sweep_of("grid", {SPEED: {"values": []}}),
+            r"values = \[\] is not allowed; it must be a list with at least one",
+        ),
+        (
+            sweep_of("grid", {SPEED: {"values": "abc"}}),
+            r'values = "abc" is not allowed; it must be a list with at least',
+        ),
+        (sweep_of("grid", {}), r"vary = \{\} is not allowed; it must be a group of fields with at least one entry\."),
+        (sweep_of("grid", [1]), r"vary = \[1\] is not allowed; it must be a group of fields with at least one entry\."),
         (sweep_of("grid", {SPEED: {"range": [1, "x", 3]}}), r'range\[1\] = "x" is not allowed; it must be a finite'),
     ],
 )

@@ -13,41 +13,67 @@ from scipy.optimize import minimize_scalar
 from warp_mpm.accuracy.measure import smoothed_force
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import DEFAULT, Setting
+from warp_mpm.quantities import Quantity
+from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Judged:
     """A figure or a curve whose error is measured."""
 
     name: str
-    label: str
-    unit: str
-    factor: float = 1.0
-    """From SI to `unit`."""
+    quantity: Quantity
+    note: str = ""
+    """What is special about it here."""
     scale: str = "itself"
     """What an error is relative to: `itself`, the name of another figure, or `volume` of the flow."""
     curve: str | None = None
     """Column of a curve; its error is the root mean square over the run, relative to the curve's greatest value."""
 
+    @property
+    def label(self) -> str:
+        """Words and symbol, and what is special."""
+        symbol = "" if self.curve else self.quantity.symbol
+        return f"{self.quantity.words} {symbol}".strip() + self.note
 
-QUANTITIES: Mapping[str, Quantity] = {
-    quantity.name: quantity
-    for quantity in (
-        Quantity("peak_force", "peak force, 10 ms mean", "kN/m", 1e-3),
-        Quantity("peak_force_time", "time of the peak (of T₂)", "s", scale="impact_duration"),
-        Quantity("impulse", "impulse", "kN s/m", 1e-3),
-        Quantity("impact_impulse", "impulse until T₂", "kN s/m", 1e-3),
-        Quantity("impact_duration", "impact duration T₂", "s"),
-        Quantity("barrier_displacement_final", "sliding distance Δx", "m"),
-        Quantity("barrier_velocity_max", "greatest barrier velocity", "m/s"),
-        Quantity("pore_pressure_max", "greatest pore pressure", "kPa", 1e-3),
-        Quantity("overtopped_volume", "volume overtopped (of the flow's)", "m³/m", scale="volume"),
-        Quantity("force_curve", "force over time, 50 ms mean", "kN/m", 1e-3, curve="impact_force_x"),
-        Quantity("energy_curve", "flow's kinetic energy over time", "kJ/m", 1e-3, curve="flow_kinetic_energy"),
-        Quantity("displacement_curve", "displacement over time", "m", curve="barrier_displacement"),
+    @property
+    def unit(self) -> str:
+        """In which it is shown."""
+        return self.quantity.shown_unit
+
+    @property
+    def factor(self) -> float:
+        """From SI to `unit`."""
+        return self.quantity.factor
+
+
+def _figure(name: str, note: str = "", scale: str = "itself") -> Judged:
+    return Judged(name, FIGURES[name], note, scale)
+
+
+def _over_time(name: str, column: str, note: str = " over time") -> Judged:
+    return Judged(name, NAMED[column], note, curve=column)
+
+
+QUANTITIES: Mapping[str, Judged] = {
+    judged.name: judged
+    for judged in (
+        _figure("peak_force", ", 10 ms mean"),
+        _figure("peak_force_time", " (of T₂)", scale="impact_duration"),
+        _figure("impulse"),
+        _figure("impact_impulse"),
+        _figure("impact_duration"),
+        _figure("barrier_displacement_final"),
+        _figure("barrier_velocity_max"),
+        _figure("pore_pressure_max"),
+        _figure("overtopped_volume", " (of the flow's)", scale="volume"),
+        _over_time("force_curve", "impact_force_x", " over time, 50 ms mean"),
+        _over_time("energy_curve", "flow_kinetic_energy"),
+        _over_time("displacement_curve", "barrier_displacement"),
     )
 }
 
@@ -214,7 +240,7 @@ def ladder_of(settings: Sequence[Setting], knob: str = DEFAULT, level: Any = Non
     return sorted((s for s in settings if s.knob == knob and s.level == level), key=lambda s: s.spacing)
 
 
-def _curve(result: Result, quantity: Quantity) -> Array:
+def _curve(result: Result, quantity: Judged) -> Array:
     if quantity.curve == "impact_force_x":
         return np.asarray(smoothed_force(result["curves"]))
     return np.asarray(result["curves"][quantity.curve], dtype=float)

@@ -10,8 +10,9 @@ import numpy as np
 
 from analytic.force_record import moving_mean
 from warp_mpm import mechanism
-from warp_mpm.results import Snapshot
+from warp_mpm.recording import Schedule, SeriesInMemory, record_until
 from warp_mpm.scenario import Scenario
+from warp_mpm.snapshot import snapshot_of
 from warp_mpm.summary import impact_figures
 
 CURVES = ("impact_force_x", "flow_kinetic_energy", "barrier_displacement")
@@ -53,40 +54,32 @@ def measure(
         "preparation_time": time.process_time() - preparing,
         "material_points": simulation.material_points,
     }
-    output = scenario.output
-    count = max(round(output.end_time_s / output.time_series_interval_s), 1)
-    stepping = recording = 0.0
-    samples = [simulation.sample()]
-    paces: list[tuple[float, float, float, int]] = []
+    recorder = _Timed(Schedule(scenario.output.time_series_interval_s))
     wall = time.perf_counter()
     try:
-        for number in range(1, count + 1):
-            begin, before = simulation.time, simulation.steps
-            start = time.process_time()
-            simulation.advance(min(number * output.time_series_interval_s, output.end_time_s))
-            half = time.process_time()
-            samples.append(simulation.sample())
-            stepping, recording = stepping + half - start, recording + time.process_time() - half
-            paces.append((begin, samples[-1]["speed_max"], half - start, simulation.steps - before))
-            if stepping + recording > limit and number < count:
-                found |= {"status": "given up", "problem": f"given up at t = {simulation.time:.3g} s"}
-                break
+        if not record_until(
+            simulation,
+            [recorder],
+            scenario.output.end_time_s,
+            stop=lambda: recorder.stepping + recorder.recording > limit,
+        ):
+            found |= {"status": "given up", "problem": f"given up at t = {simulation.time:.3g} s"}
     except SimulationDiverged as error:
         found |= {"status": "diverged", "problem": str(error)}
     found |= {
-        "cpu_time": stepping,
-        "recording_time": recording,
+        "cpu_time": recorder.stepping,
+        "recording_time": recorder.recording,
         "wall_time": time.perf_counter() - wall,
         "end_time": simulation.time,
         "steps": simulation.steps,
-        "samples": len(samples),
-        "paces": _thinned(paces),
+        "samples": len(recorder.samples),
+        "paces": _thinned(recorder.paces),
         "figures": {},
         "curves": {},
         "kernel_times": {},
     }
     if found["status"] == "finished":
-        series = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+        series = recorder.series()
         found["figures"] = _figures(scenario, simulation, series)
         found["curves"] = {
             name: [float(f"{value:.7g}") for value in series[name]] for name in ("time", *CURVES) if name in series
@@ -94,6 +87,27 @@ def measure(
         if profile:
             found["kernel_times"] = _kernel_times(simulation)
     return found
+
+
+class _Timed(SeriesInMemory):
+    """Keeps the samples and what they cost: CPU times of stepping and of recording [s]."""
+
+    def __init__(self, schedule: Schedule):
+        super().__init__(schedule)
+        self.stepping = self.recording = 0.0
+        self.paces: list[tuple[float, float, float, int]] = []
+        """Of each stretch its begin [s], greatest speed [m/s], CPU time [s] and steps."""
+        self._before: tuple[float, int, float] | None = None
+
+    def record(self, simulation: Any) -> None:
+        half = time.process_time()
+        super().record(simulation)
+        now = time.process_time()
+        if self._before is not None:
+            begin, steps, start = self._before
+            self.stepping, self.recording = self.stepping + half - start, self.recording + now - half
+            self.paces.append((begin, self.latest["speed_max"], half - start, simulation.steps - steps))
+        self._before = simulation.time, simulation.steps, time.process_time()
 
 
 def _figures(scenario: Scenario, simulation: Any, series: dict[str, Any]) -> dict[str, float | None]:
@@ -105,10 +119,7 @@ def _figures(scenario: Scenario, simulation: Any, series: dict[str, Any]) -> dic
     moves = scenario.barrier is not None and scenario.barrier.motion.kind == "sliding"
     figures["barrier_velocity_max"] = figures.pop("barrier_velocity", None) if moves else None
     figures["barrier_displacement_final"] = float(series["barrier_displacement"][-1]) if moves else None
-    points = simulation.points()
-    shift = simulation.barrier_displacement if scenario.barrier is not None else None
-    snapshot = Snapshot(simulation.time, shift, points.pop("position"), points)
-    return figures | mechanism.deposit(scenario, snapshot)
+    return figures | mechanism.deposit(scenario, snapshot_of(simulation))
 
 
 def _thinned(paces: list[tuple[float, float, float, int]]) -> list[list[float]]:

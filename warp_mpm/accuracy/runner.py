@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +12,7 @@ from typing import Any
 from analytic.whole_file import write_whole
 from warp_mpm.accuracy.measure import measure
 from warp_mpm.accuracy.study import Setting
+from warp_mpm.engine import Processes, Task
 from warp_mpm.scenario import Scenario
 
 Result = dict[str, Any]
@@ -66,40 +64,40 @@ def run_settings(
     folder.mkdir(parents=True, exist_ok=True)
     found = {key: result for key in {s.key for s in settings} if (result := _read(folder / f"{key}.json")) is not None}
     # The dearest first, so that no core waits for a long one at the end.
-    waiting = sorted((s for s in settings if s.key not in found), key=_cost)
+    waiting = sorted((s for s in settings if s.key not in found), key=_cost, reverse=True)
     whole, started = sum(map(_cost, waiting)), time.perf_counter()
     spent, done = 0.0, len(found)
     on_progress(StudyProgress(done, (), len(waiting), None))
     if not waiting:
         return found
-    running: dict[Future[Result], Setting] = {}
-    # Warp's state does not survive a fork.
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-    try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                setting = waiting.pop()
-                path = folder / f"{setting.key}.json"
-                running[pool.submit(run_setting, setting.scenario.resolved(), str(path))] = setting
-            elapsed = time.perf_counter() - started
-            left = (whole - spent) * elapsed / spent if spent else None
-            on_progress(StudyProgress(done, tuple(s.name for s in running.values()), len(waiting), left))
-            ended, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in ended:
-                setting = running.pop(future)
-                found[setting.key] = future.result()
-                spent, done = spent + _cost(setting), done + 1
-        on_progress(StudyProgress(done, (), 0, 0.0))
-    except BrokenProcessPool:
-        raise StudyError(
-            f"A run was killed, for want of memory perhaps; the runs that ended are in {folder}, and the same command "
-            "goes on from there, with fewer at a time by --jobs."
-        ) from None
-    finally:
-        processes = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes if running else []:
-            process.terminate()
+    running: dict[str, Setting] = {}
+
+    def began(task: Task) -> None:
+        running[task.name] = by_key[task.name]
+        tell()
+
+    def tell() -> None:
+        elapsed = time.perf_counter() - started
+        left = (whole - spent) * elapsed / spent if spent else None
+        names = tuple(setting.name for setting in running.values())
+        on_progress(StudyProgress(done, names, len(waiting) - done - len(running) + known, left))
+
+    by_key, known = {setting.key: setting for setting in waiting}, done
+    tasks = [
+        Task(setting.key, run_setting, (setting.scenario.resolved(), str(folder / f"{setting.key}.json")))
+        for setting in waiting
+    ]
+    for ended in Processes(jobs).run(tasks, on_start=began):
+        setting = running.pop(ended.task.name)
+        if ended.problem is not None:
+            reason = "A run was killed, for want of memory perhaps" if ended.died else f"A run failed ({ended.problem})"
+            raise StudyError(
+                f"{reason}; the runs that ended are in {folder}, and the same command goes on from there, with fewer "
+                "at a time by --jobs."
+            )
+        found[setting.key] = ended.result
+        spent, done = spent + _cost(setting), done + 1
+    on_progress(StudyProgress(done, (), 0, 0.0))
     return found
 
 

@@ -12,6 +12,7 @@ from warp_mpm.commands.benchmark import benchmark
 from warp_mpm.commands.hard_cases import hard_cases
 from warp_mpm.commands.plan import plan
 from warp_mpm.commands.plot import plot
+from warp_mpm.commands.quantities import quantities
 from warp_mpm.commands.report import report
 from warp_mpm.commands.scenarios import scenarios
 from warp_mpm.commands.sweep import sweep
@@ -19,6 +20,7 @@ from warp_mpm.commands.validate import validate
 
 EXAMPLES: dict[Callable[..., None], str] = {
     scenarios: "Example: python -m warp_mpm scenarios; all of them: python -m warp_mpm scenarios --out scenarios",
+    quantities: "Example: python -m warp_mpm quantities scenarios/case_1.json",
     report: (
         "Example: python -m warp_mpm report runs/set_iib; "
         "two side by side: python -m warp_mpm report runs/case_1 runs/case_1_fixed --out comparison.html"

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
+from signal import SIGTERM
 from typing import Any
 
 import typer
@@ -93,7 +94,10 @@ def run_several(
         )
     for end in ends:
         if end.code != 0:
-            complain(f"{end.job.name}: {end.message or f'ended with exit code {end.code}'}")
+            # Only before it has begun does a run end by the signal itself, or without a word.
+            early = signal.received and (end.code == -SIGTERM or (end.code == INTERRUPTED and not end.message))
+            said = "stopped before it had begun." if early else end.message or f"ended with exit code {end.code}"
+            complain(f"{end.job.name}: {said}")
     begun = sorted(
         (end for end in ends if end.code in (0, DIVERGED, INTERRUPTED)), key=lambda end: planned.index(end.job)
     )
@@ -124,6 +128,7 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
     from rich.table import Table
 
     from warp_mpm.caveats import told_of
+    from warp_mpm.quantities.figures import FIGURES
     from warp_mpm.terminal import AT_LEAST, sliding_distance
 
     console = Console(highlight=False, markup=False)
@@ -131,19 +136,19 @@ def _print(summaries: dict[str, dict[str, Any]]) -> None:
         console.width = 160  # a file has no edge to fit to
     table = Table(box=box.SIMPLE_HEAD)
     words = ("run", "status", "mechanism")
-    figures = ("peak F₂ₓ, 0.05 s mean [kN/m]", "impulse [kN s/m]", "Δx [m]")
-    for heading in (*words[:2], *figures, words[2], "wall time [s]"):
+    figures = [FIGURES[name].column for name in ("peak_force_filtered", "impulse", "barrier_displacement_final")]
+    for heading in (*words[:2], *figures, words[2], FIGURES["wall_time"].column):
         table.add_column(heading, justify="left" if heading in words else "right")
     for folder, summary in summaries.items():
 
-        def cell(name: str, factor: float = 1.0, summary: dict[str, Any] = summary) -> str:
-            return "–" if summary.get(name) is None else f"{summary[name] * factor:,.4g}"
+        def cell(name: str, summary: dict[str, Any] = summary) -> str:
+            return "–" if summary.get(name) is None else f"{summary[name] * FIGURES[name].factor:,.4g}"
 
         table.add_row(
             folder,
             str(summary.get("status")),
-            cell("peak_force_filtered", 1e-3),
-            cell("impulse", 1e-3),
+            cell("peak_force_filtered"),
+            cell("impulse"),
             sliding_distance(summary),
             summary.get("mechanism") or "–",
             cell("wall_time"),

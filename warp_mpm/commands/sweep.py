@@ -13,15 +13,8 @@ from analytic.command_line import complain, refusals
 CASE_FAILED = 4
 """Exit code when the sweep went through and some of its cases failed."""
 
-SHOWN = {
-    "peak_force_filtered": ("peak F₂ₓ, 0.05 s mean [kN/m]", 1e-3),
-    "impulse": ("impulse [kN s/m]", 1e-3),
-    "barrier_velocity_max": ("v₂,max [m/s]", 1.0),
-    "barrier_displacement_final": ("Δx [m]", 1.0),
-    "overtopped_volume": ("beyond [m³/m]", 1.0),
-}
-"""Key figures of the table on the terminal, with headings and factors from SI; the Parquet file has all."""
-
+SHOWN = ("peak_force_filtered", "impulse", "barrier_velocity_max", "barrier_displacement_final", "overtopped_volume")
+"""Key figures of the table on the terminal; the Parquet file has all."""
 
 MOST_NAMED = 20
 """Cases that a note under the table names."""
@@ -97,6 +90,7 @@ def _print(rows: list[dict[str, Any]], varied: list[str], notes: dict[int, list[
     from rich.table import Table
 
     from warp_mpm.caveats import told_of
+    from warp_mpm.quantities.figures import FIGURES
     from warp_mpm.terminal import AT_LEAST, sliding_distance
 
     console = Console(highlight=False, markup=False)
@@ -104,10 +98,10 @@ def _print(rows: list[dict[str, Any]], varied: list[str], notes: dict[int, list[
         console.width = 200  # a file has no edge to fit to
     table = Table(box=box.SIMPLE_HEAD)
     shown = [name for name in SHOWN if any(row.get(name) is not None for row in rows)]
-    for heading in ("case", *map(_leaf, varied), "status", *(SHOWN[name][0] for name in shown)):
+    for heading in ("case", *map(_leaf, varied), "status", *(FIGURES[name].column for name in shown)):
         table.add_column(heading, justify="right")
     for row in rows:
-        figures = ["–" if row.get(name) is None else f"{row[name] * SHOWN[name][1]:.4g}" for name in shown]
+        figures = ["–" if row.get(name) is None else f"{row[name] * FIGURES[name].factor:.4g}" for name in shown]
         if "barrier_displacement_final" in shown:
             figures[shown.index("barrier_displacement_final")] = sliding_distance(row)
         table.add_row(str(row["case"]), *(_short(row[path]) for path in varied), row["status"], *figures)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from warp_mpm.hard_cases.bounds import impact_speed, pressure_bound, speed_bound
 from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
-from warp_mpm.recording import Schedule, record_until
-from warp_mpm.results import Snapshot
+from warp_mpm.recording import Recorder, Schedule, SeriesInMemory, Watcher, record_until
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
 from warp_mpm.simulator.bodies.of_scene import barrier_body
 from warp_mpm.simulator.laws import LAWS
+from warp_mpm.snapshot import Snapshot, snapshot_of
 from warp_mpm.summary import impact_figures, momentum_error
 from warp_mpm.time_step import step_limits
 
@@ -68,33 +68,21 @@ def measure(
     return measured
 
 
-@dataclass
-class _Looker:
-    """A recorder that writes nothing."""
-
-    schedule: Schedule
-    record: Callable[[Any], None]
-
-    def close(self) -> None:
-        """There is nothing to close."""
-
-
 def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Measured:
     started = time.perf_counter()
     simulation = make_simulation(scenario)
     output = scenario.output
-    samples: list[dict[str, float]] = []
     noise: list[float] = []
     extremes = dict.fromkeys(("penetration", "porosity_high", "yield_excess", "stress_max"), 0.0) | {
         "porosity_low": -1.0
     }
     measured = Measured({"diverged": 0.0})
-    material, begin = scenario.flow.material, _snapshot(simulation)
+    material, begin = scenario.flow.material, snapshot_of(simulation)
     law = LAWS.named(material.law)
     undecided_energy = law.undecided_energy(material, begin["volume"], begin["effective_stress"])
 
     def look(simulation: Any) -> None:
-        snapshot = _snapshot(simulation)
+        snapshot = snapshot_of(simulation)
         if len(snapshot.position) > 0:
             _widen(extremes, scenario, snapshot)
             noise.extend(_pressure_noise(scenario, snapshot))
@@ -102,24 +90,16 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
                 measured.peak = snapshot
         measured.last = snapshot
 
-    windows: list[Any] = [None]
-
-    def sample(simulation: Any) -> None:
-        samples.append(simulation.sample(since=windows[-1]))
-        windows[-1] = simulation.window()
-
-    recorders = [
-        _Looker(Schedule(output.time_series_interval_s), sample),
-        _Looker(Schedule(output.snapshot_interval_s), look),
-    ]
+    series = SeriesInMemory(Schedule(output.time_series_interval_s))
+    recorders: list[Recorder] = [series, Watcher(Schedule(output.snapshot_interval_s), look)]
     try:
         record_until(simulation, recorders, output.end_time_s)
     except SimulationDiverged as error:
         measured.figures["diverged"], measured.problem = 1.0, str(error)
-    if not samples:
+    if not series.samples:
         return measured
     record, points, steps = simulation.record, simulation.material_points, max(simulation.steps, 1)
-    columns = {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+    columns = series.series()
     measured.figures |= (
         extremes
         | _of_the_series(scenario, columns, undecided_energy)
@@ -144,11 +124,6 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
     if noise:
         measured.figures["pressure_noise"] = float(np.median(noise))
     return measured
-
-
-def _snapshot(simulation: Any) -> Snapshot:
-    points = simulation.points()
-    return Snapshot(simulation.time, simulation.barrier_displacement, points.pop("position"), points)
 
 
 def _violence(snapshot: Snapshot) -> float:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -28,12 +30,17 @@ CPU_COMPILER_FLAGS = (
 )
 """Warp's own flags without its bound on the depth of vectorisation, and with fused multiply-add."""
 
+CHECKED = os.environ.get("WARP_MPM_CHECKED", "") not in ("", "0")
+"""Whether kernels are built for debugging: an index outside its array ends the process, and says so."""
+
 
 @cache
 def build_kernels(effects: Effects) -> SimpleNamespace:
     """Kernels for `effects`, and no others, in a Warp module of their own."""
     module = effects.module_name
-    options = {"enable_backward": False, "cpu_compiler_flags": CPU_COMPILER_FLAGS}
+    options: dict[str, Any] = {"enable_backward": False, "cpu_compiler_flags": CPU_COMPILER_FLAGS}
+    if CHECKED:
+        options["mode"] = "debug"
     wp.set_module_options(options, module=wp.get_module(module))
     types = layout(effects)
     shapes = make_shape_functions(types)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from warp_mpm.effect_rules import Rule, effect_rules
 from warp_mpm.performance.probe import Stepper, clock_of, in_turns
-from warp_mpm.recording import Recorder, SnapshotRecorder, TimeSeriesRecorder
+from warp_mpm.recording import Recorder, Schedule, SnapshotRecorder, TimeSeriesRecorder, Watcher, record_until
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.time_step import step_limits
@@ -198,14 +198,17 @@ def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:
     twin, clock = Simulation(scenario.replaced(changes), device=device), clock_of(device)
     twin.advance(1e-6 * end_time)
     ahead: list[Ahead] = []
-    begin, speed = clock(), flow.speed
-    for count in range(1, TWIN_STRETCHES + 1):
-        if clock() - begin > TWIN_SECONDS:
-            break
-        time, steps, now = twin.time, twin.steps, clock()
-        twin.advance(end_time * count / TWIN_STRETCHES)
-        ahead.append(Ahead(time, speed, (clock() - now) / (twin.steps - steps)))
-        speed = twin.sample()["speed_max"]
+    begin = clock()
+    before = [twin.time, flow.speed, twin.steps, begin]
+
+    def look(twin: Simulation) -> None:
+        time, speed, steps, now = before
+        if twin.steps > steps:
+            ahead.append(Ahead(time, speed, (clock() - now) / (twin.steps - steps)))
+        before[:] = [twin.time, twin.sample(["speed_max"])["speed_max"], twin.steps, clock()]
+
+    stretches = Schedule(end_time / TWIN_STRETCHES, twin.time)
+    record_until(twin, [Watcher(stretches, look)], end_time, stop=lambda: clock() - begin > TWIN_SECONDS)
     return ahead
 
 

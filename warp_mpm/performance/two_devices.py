@@ -18,6 +18,7 @@ from analytic.force_record import moving_mean
 from warp_mpm.effect_rules import without_liquid
 from warp_mpm.performance.probe import Stepper, in_turns
 from warp_mpm.performance.table import Progress, Table
+from warp_mpm.recording import Schedule, SeriesInMemory, record_until
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.summary import energy_error, mass_error, momentum_error
@@ -178,12 +179,9 @@ def _run(scene: Scenario, device: str, *, nudge: float = 0.0) -> dict[str, Any]:
     if nudge:
         velocity = simulation.points(["solid_velocity"])["solid_velocity"]
         simulation.set_points(solid_velocity=velocity * (1.0 + nudge))
-    samples = [simulation.sample()]
-    interval = scene.output.time_series_interval_s
-    for record in range(1, round(scene.output.end_time_s / interval) + 1):
-        simulation.advance(record * interval)
-        samples.append(simulation.sample())
-    return {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+    recorder = SeriesInMemory(Schedule(scene.output.time_series_interval_s))
+    record_until(simulation, [recorder], scene.output.end_time_s)
+    return recorder.series()
 
 
 def _ledger(scene: Scenario, run: dict[str, Any]) -> list[float]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from analytic.force_record import FILTER_WINDOW, moving_mean
-from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid, heading
+from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid, heading, named, symbol
+from warp_mpm.quantities import Quantity, Sampled
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Fixed
 
@@ -31,50 +35,49 @@ def force_and_displacement(results: Results) -> Figure:
     time = series["time"]
     moves = not isinstance(scenario.barrier.motion, Fixed) and "barrier_displacement" in series
     energies = "flow_kinetic_energy" in series
-    rows = 1 + moves + energies
+    own = own_quantities([results])
+    rows = 1 + moves + energies + len(own)
     figure = Figure(figsize=(7.5, 2.5 + 2.0 * rows), layout="constrained")
     axes = figure.subplots(rows, 1, sharex=True, height_ratios=[2.0] + [1.0] * (rows - 1), squeeze=False).ravel()
     heading(figure, scenario.title)
 
     forces = axes[0]
-    raw = series["impact_force_x"] / 1e3
-    filtered = moving_mean(time, series["impact_force_x"]) / 1e3
+    force = NAMED["impact_force_x"]
+    raw = series[force.name] * force.factor
+    filtered = moving_mean(time, raw)
     forces.plot(time, raw, color=BLUE, alpha=0.3, linewidth=0.7)
-    forces.plot(time, filtered, color=BLUE, label="impact, horizontal $F_{2,x}$")
-    lines = (
-        ("impact_force_y", "impact, vertical $F_{2,y}$", ORANGE, "-"),
-        ("top_force", "crest $F_3$", GREEN, "-"),
-        ("base_force", "base friction $F_4$", PURPLE, "--"),
-    )
-    for name, label, colour, style in lines:
+    forces.plot(time, filtered, color=BLUE, label=named(force))
+    lines = (("impact_force_y", ORANGE, "-"), ("top_force", GREEN, "-"), ("base_force", PURPLE, "--"))
+    for name, colour, style in lines:
         if name in series and np.any(series[name]):
-            forces.plot(time, moving_mean(time, series[name]) / 1e3, color=colour, linestyle=style, label=label)
+            values = moving_mean(time, series[name]) * NAMED[name].factor
+            forces.plot(time, values, color=colour, linestyle=style, label=named(NAMED[name]))
     peak = int(np.argmax(filtered))
     forces.plot(time[peak], filtered[peak], "o", color=BLUE, markersize=4)
     late = time[peak] > 0.5 * (time[0] + time[-1])
     forces.annotate(
-        f"{filtered[peak]:.0f} kN/m at {time[peak]:.2f} s",
+        f"{filtered[peak]:.0f} {force.shown_unit} at {time[peak]:.2f} s",
         (time[peak], filtered[peak]),
         xytext=(-8 if late else 8, 2),
         textcoords="offset points",
         ha="right" if late else "left",
         fontsize=9,
     )
-    forces.set_ylabel(f"force [kN/m],\nmean over {FILTER_WINDOW:g} s")
+    forces.set_ylabel(f"force [{force.shown_unit}],\nmean over {FILTER_WINDOW:g} s")
     forces.axhline(0.0, color=GREY, linewidth=0.6)
     # Above the panel: within it, no corner is free of curves in every run.
-    forces.legend(fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, **NARROW_LEGEND)
+    forces.legend(fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, **NARROW_LEGEND)
 
     if moves:
         moved = axes[1]
-        displacement = series["barrier_displacement"]
+        displacement = series["barrier_displacement"] * NAMED["barrier_displacement"].factor
         moved.plot(time, displacement, color=BLUE)
-        moved.set_ylabel("barrier\ndisplacement [m]")
+        moved.set_ylabel(f"barrier\ndisplacement [{NAMED['barrier_displacement'].shown_unit}]")
         at_rest = series.get("barrier_velocity", np.zeros(1))[-1] == 0.0
         going = "" if at_rest else f", still {GOING[scenario.barrier.motion.kind]}"
         moved.margins(y=0.25)
         moved.annotate(
-            f"{displacement[-1]:.2f} m{going}",
+            f"{displacement[-1]:.2f} {NAMED['barrier_displacement'].shown_unit}{going}",
             (time[-1], displacement.max()),  # not on the curve, wherever it goes
             xytext=(-4, 3),
             textcoords="offset points",
@@ -83,13 +86,17 @@ def force_and_displacement(results: Results) -> Figure:
             fontsize=9,
         )
     if energies:
-        energy = axes[-1]
-        energy.plot(time, series["flow_kinetic_energy"] / 1e3, color=BLUE, label="flow")
+        energy, unit = axes[1 + moves], NAMED["flow_kinetic_energy"]
+        energy.plot(time, series["flow_kinetic_energy"] * unit.factor, color=BLUE, label="flow")
         if moves and "barrier_kinetic_energy" in series:
-            energy.plot(time, series["barrier_kinetic_energy"] / 1e3, color=ORANGE, linestyle="--", label="barrier")
-        energy.set_ylabel("kinetic\nenergy [kJ/m]")
+            kinetic = series["barrier_kinetic_energy"] * unit.factor
+            energy.plot(time, kinetic, color=ORANGE, linestyle="--", label="barrier")
+        energy.set_ylabel(f"kinetic\nenergy [{unit.shown_unit}]")
         energy.legend(fontsize=9)
         energy.set_ylim(bottom=0.0)
+    for panel, quantity in zip(axes[1 + moves + energies :], own, strict=True):
+        panel.plot(time, _curve(series, quantity), color=BLUE)
+        panel.set_ylabel(_axis(quantity))
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(float(time[0]), float(time[-1]))
     for panel in axes:
@@ -103,14 +110,9 @@ def _no_force(results: Results) -> str:
 
 
 COMPARED = (
-    ("impact_force_x", "impact, horizontal\n$F_{2,x}$ [kN/m]", 1e-3),
-    ("impact_force_y", "impact, vertical\n$F_{2,y}$ [kN/m]", 1e-3),
-    ("top_force", "friction on the crest\n$F_3$ [kN/m]", 1e-3),
-    ("base_force", "friction at the base\n$F_4$ [kN/m]", 1e-3),
-    ("barrier_displacement", "barrier displacement\n$\\Delta x$ [m]", 1.0),
-    ("flow_kinetic_energy", "kinetic energy of the flow\n[kJ/m]", 1e-3),
+    *("impact_force_x", "impact_force_y", "top_force", "base_force", "barrier_displacement", "flow_kinetic_energy"),
 )
-"""Column, label and factor of each panel of `comparison`."""
+"""Columns with a panel of their own in `comparison`; what a script records comes after them."""
 
 ALWAYS_COMPARED = ("impact_force_x", "flow_kinetic_energy")
 """Columns whose panel is there even where they are nil in all runs."""
@@ -126,9 +128,9 @@ def comparison(runs: Sequence[Results]) -> Figure:
     if not any("impact_force_x" in one for one in series):
         raise ResultsError(_no_force(runs[0]))
     shown = [
-        row
-        for row in COMPARED
-        if row[0] in ALWAYS_COMPARED or any(np.any(columns.get(row[0], 0.0)) for columns in series)
+        quantity
+        for quantity in (*(NAMED[name] for name in COMPARED), *own_quantities(runs))
+        if quantity.name in ALWAYS_COMPARED or any(np.any(columns.get(quantity.name, 0.0)) for columns in series)
     ]
     rows = math.ceil(len(shown) / 2)
     figure = Figure(figsize=(10.0, 2.7 * rows + 0.9), layout="constrained")
@@ -139,17 +141,17 @@ def comparison(runs: Sequence[Results]) -> Figure:
     for number, (results, columns) in enumerate(zip(runs, series, strict=True)):
         colour = RUN_COLOURS[number % len(RUN_COLOURS)]
         time = columns["time"]
-        for panel, (name, _, factor) in zip(axes, shown, strict=True):
-            if name not in columns:
+        for panel, quantity in zip(axes, shown, strict=True):
+            if quantity.name not in columns:
                 continue
-            values = columns[name] if name not in FORCE_COLUMNS else moving_mean(time, columns[name])
             label = results.scenario.title if panel is axes[0] else None
-            panel.plot(time, values * factor, color=colour, linewidth=1.2, label=label)
-        if np.any(columns.get("barrier_kinetic_energy", 0.0)):
-            axes[-1].plot(time, columns["barrier_kinetic_energy"] / 1e3, color=colour, linewidth=1.2, linestyle="--")
-            axes[-1].set_title("flow (solid), barrier (dashed)", fontsize=9)
-    for panel, (_, label, _) in zip(axes, shown, strict=True):
-        panel.set_ylabel(label)
+            panel.plot(time, _curve(columns, quantity), color=colour, linewidth=1.2, label=label)
+            if quantity.name == "flow_kinetic_energy" and np.any(columns.get("barrier_kinetic_energy", 0.0)):
+                kinetic = _curve(columns, NAMED["barrier_kinetic_energy"])
+                panel.plot(time, kinetic, color=colour, linewidth=1.2, linestyle="--")
+                panel.set_title("flow (solid), barrier (dashed)", fontsize=9)
+    for panel, quantity in zip(axes, shown, strict=True):
+        panel.set_ylabel(_axis(quantity))
         panel.axhline(0.0, color=GREY, linewidth=0.6)
         grid(panel)
     for panel in axes[-2:]:
@@ -159,5 +161,19 @@ def comparison(runs: Sequence[Results]) -> Figure:
     return figure
 
 
-FORCE_COLUMNS = ("impact_force_x", "impact_force_y", "top_force", "base_force")
-"""Columns that are drawn as moving means."""
+def own_quantities(runs: Sequence[Results]) -> list[Quantity]:
+    """What scripts recorded in any of the runs, beside the columns of the package."""
+    found = {name: one for results in runs for name, one in results.quantities.items() if name not in NAMED}
+    return list(found.values())
+
+
+def _curve(series: Mapping[str, Any], quantity: Quantity) -> Any:
+    """A column in the unit in which it is shown; of forces the moving mean."""
+    values = series[quantity.name] * quantity.factor
+    return moving_mean(series["time"], values) if isinstance(quantity, Sampled) and quantity.mean else values
+
+
+def _axis(quantity: Quantity) -> str:
+    """Label of a panel's axis, in two or three lines."""
+    lines = textwrap.wrap(quantity.words, 26)
+    return "\n".join([*lines, " ".join(part for part in (symbol(quantity), f"[{quantity.shown_unit}]") if part)])

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patches import Rectangle
 
-from warp_mpm.fields import Field, colour_limits, field_named, field_values
+from warp_mpm.fields import colour_limits, field_named, field_values
 from warp_mpm.plotting.style import BARRIER, EDGE, GREY, GROUND, heading
+from warp_mpm.quantities.points import Drawn
 from warp_mpm.results import Results, ResultsError, Snapshot
 from warp_mpm.scenario import Scenario, Trapezoid
 
@@ -94,7 +95,7 @@ def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] | No
             panel = axes[row, column]
             drawn = draw_points(panel, frame, values[column][row], field, (low, high))
             draw_surroundings(panel, results.scenario, frame, view)
-            greatest = f"{values[column][row].max(initial=0.0):.3g} {field.unit.strip('-')}"
+            greatest = f"{values[column][row].max(initial=0.0):.3g} {field.shown_unit.strip('-')}"
             caption = f"t = {frame.time:.2f} s, greatest {greatest.strip()}"
             if row == 0 and len(runs) > 1:
                 caption = f"{in_lines(results.scenario.title, min(panel_height * aspect, page))}\n{caption}"
@@ -119,7 +120,7 @@ def in_lines(words: str, length: float) -> str:
     return textwrap.fill(words, max(8, int(length / LETTER)), break_on_hyphens=False)
 
 
-def shown(results: Results, frame: Snapshot, field: Field) -> np.ndarray:
+def shown(results: Results, frame: Snapshot, field: Drawn) -> np.ndarray:
     """Values [N] of a field of a snapshot.
 
     Raises:
@@ -127,7 +128,7 @@ def shown(results: Results, frame: Snapshot, field: Field) -> np.ndarray:
     """
     values = field_values(frame, field.name, results.scenario.flow.material.solid_partial_density)
     if values is None:
-        raise ResultsError(f"{results.path} has no {field.label}: it is a {results.scenario.flow.formulation} flow.")
+        raise ResultsError(f"{results.path} has no {field.words}: it is a {results.scenario.flow.formulation} flow.")
     return values
 
 
@@ -147,7 +148,7 @@ def window(scenario: Scenario, frames: Sequence[Snapshot]) -> Window:
 
 
 def draw_points(
-    panel: Axes, frame: Snapshot, values: np.ndarray, field: Field, limits: tuple[float, float]
+    panel: Axes, frame: Snapshot, values: np.ndarray, field: Drawn, limits: tuple[float, float]
 ) -> EllipseCollection:
     """Each material point as a disc to scale, wide enough to meet its neighbours in a flow that has stretched."""
     diameter = 1.4 * np.sqrt(frame["volume"])

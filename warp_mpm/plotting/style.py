@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analytic.whole_file import whole_file
+from warp_mpm.quantities import Quantity
 
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#6E6E6E"
 RUN_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#000000", GREY)
@@ -50,6 +52,20 @@ def save(figure: Figure, path: str | Path) -> None:
 def heading(figure: Figure, title: str) -> Text:
     """A scenario's title above its figure, in as many lines as it takes; a dollar in it begins no formula."""
     return figure.suptitle(title.replace("$", r"\$"), fontsize=11, wrap=True)
+
+
+def symbol(quantity: Quantity) -> str:
+    """A quantity's symbol as matplotlib sets it: F₂,x as $F_{2,x}$, Δx as $Δx$."""
+    if not quantity.symbol:
+        return ""
+    base, index = re.fullmatch(r"([^₀-₉ₖ_]*)_?(.*)", quantity.symbol).groups()  # type: ignore[union-attr]
+    index = index.translate(str.maketrans("₀₁₂₃₄₅₆₇₈₉ₖ", "0123456789k"))
+    return f"${base}_{{{index}}}$" if index else f"${base}$"
+
+
+def named(quantity: Quantity, between: str = " ") -> str:
+    """Words and symbol of a quantity."""
+    return between.join(part for part in (quantity.words, symbol(quantity)) if part)
 
 
 def grid(panel: Axes) -> None:

@@ -7,7 +7,7 @@ the end of the run where that is among them. No record therefore covers less.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any, Protocol
 
 from warp_mpm.time_step import SHORTEST_RECORD
@@ -69,8 +69,33 @@ class Schedule:
         return True
 
 
+class Moments(Schedule):
+    """Times that are listed, one after the other."""
+
+    def __init__(self, times: Iterable[float]):
+        """Args: times [s] in their order."""
+        super().__init__(1.0)
+        self.times = tuple(float(time) for time in times)
+
+    @property
+    def next_time(self) -> float:
+        """The time that comes next [s]; infinite after the last."""
+        return self.times[self.count] if self.count < len(self.times) else math.inf
+
+    def due(self, time: float, slack: float = 0.0) -> bool:
+        """As of any schedule; the times are told apart by `slack` [s] alone."""
+        if self.next_time - time > slack:
+            return False
+        while self.next_time - time <= slack:
+            self.count += 1
+        return True
+
+
 class Recorder(Protocol):
-    """Writes something of the simulation at its own times."""
+    """Writes something of the simulation at its own times: whatever has these three is a recorder.
+
+    `docs/develop/add_a_recorder.md` goes through one of a script.
+    """
 
     schedule: Schedule
 

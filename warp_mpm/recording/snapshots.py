@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from warp_mpm.quantities import POINT_FIELDS, check_known
+from warp_mpm.quantities.points import POINT_FIELDS
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 
@@ -193,7 +193,9 @@ class SnapshotRecorder:
 
     def _lay_out(self, number: int, fields: dict[str, np.ndarray]) -> None:
         """Create every group, attribute and data set; `number` is the most points that any snapshot will have."""
-        check_known(set(fields), POINT_FIELDS)
+        unknown = sorted(fields.keys() - POINT_FIELDS.keys())
+        if unknown:
+            raise KeyError(f"No unit is known for {', '.join(unknown)}; add it to warp_mpm/quantities/points.py.")
         root, room, number = self._root, self._room, max(number, 1)
         root.attrs["Version"] = np.array([2, 2])
         root.attrs.create("Type", np.bytes_("UnstructuredGrid"))

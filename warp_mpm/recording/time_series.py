@@ -8,20 +8,16 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
-from warp_mpm.quantities import TIME_SERIES, check_known, time_series_quantity
+from warp_mpm.quantities import TIME_SERIES, Quantity, quantity_of_column
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.schedule import Schedule
 from warp_mpm.state.samples import Window
 
 
-def key_of(label: str) -> str | None:
-    """Key in the samples of the column that `label` heads; None where no run writes such a column."""
-    for key, quantity in TIME_SERIES.items():
-        if quantity.label == label:
-            return key
-    name = label.partition(" [")[0]
-    force = time_series_quantity(name)
-    return name if force is not None and force.label == label else None
+def column_named(heading: str) -> Quantity | None:
+    """Quantity of the column with this heading; None where no run writes such a column."""
+    quantity = quantity_of_column(heading.partition(" [")[0])
+    return quantity if quantity is not None and quantity.heading == heading else None
 
 
 class TimeSeriesRecorder:
@@ -71,11 +67,18 @@ class TimeSeriesRecorder:
             raise RunFolderError(f"{path} cannot be read: {error.strerror or error}.") from None
         except ValueError as error:
             raise RunFolderError(f"{path} cannot be read: {error}.") from None
-        names = {label: key_of(label) for label in header}
-        if size < mark["bytes"] or None in names.values():
+        found = {heading: column_named(heading) for heading in header}
+        unknown = [heading for heading, quantity in found.items() if quantity is None]
+        if size < mark["bytes"] or unknown == [""]:
             self._file.close()
             raise RunFolderError(f"{path} is damaged: it does not reach to the checkpoint.")
-        self._columns = [key for key in names.values() if key is not None]
+        if unknown:
+            self._file.close()
+            raise RunFolderError(
+                f"{path} has the column {unknown[0]!r}, which no run writes by itself; the script that registered the "
+                "quantity can go on with the run."
+            )
+        self._columns = [getattr(quantity, "key", "") for quantity in found.values()]
         self._file.truncate(mark["bytes"])
         self._file.seek(mark["bytes"])
 
@@ -91,10 +94,8 @@ class TimeSeriesRecorder:
         sample = simulation.sample(self._quantities, since=self._window)
         self._window = simulation.window()
         if not self._columns:
-            quantities = {name: time_series_quantity(name) for name in (*TIME_SERIES, *sample) if name in sample}
-            check_known({name for name, quantity in quantities.items() if quantity is None}, TIME_SERIES)
-            self._columns = list(quantities)
-            self._file.write(",".join(quantity.label for quantity in quantities.values() if quantity) + "\n")
+            self._columns = [key for key in dict.fromkeys((*TIME_SERIES, *sample)) if key in sample]
+            self._file.write(",".join(_quantity(key).heading for key in self._columns) + "\n")
         # One write per line, so that a reader at work at the same time sees whole lines.
         self._file.write(",".join(repr(float(sample[name])) for name in self._columns) + "\n")
         self._file.flush()
@@ -103,3 +104,15 @@ class TimeSeriesRecorder:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _quantity(key: str) -> Quantity:
+    """Of a sample's entry.
+
+    Raises:
+        KeyError: it has no entry in the table, so that its unit would go unsaid.
+    """
+    quantity = TIME_SERIES.get(key) or quantity_of_column(key)
+    if quantity is None:
+        raise KeyError(f"No unit is known for {key}; add it to warp_mpm/quantities/time_series.py.")
+    return quantity

@@ -15,6 +15,9 @@ from analytic.scene import SceneError, scene_of
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.description import described
 from warp_mpm.effect_rules import effect_rules
+from warp_mpm.quantities import Quantity, Sampled
+from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
 from warp_mpm.scenario import Trapezoid, Wall
 from warp_mpm.terminal import summary_rows
@@ -24,39 +27,18 @@ Array = NDArray[np.float64]
 MOST_SAMPLES = 3000
 """Samples of a curve beyond which it is thinned; a line across a page shows no more."""
 
-CURVES: tuple[tuple[str, str, float, tuple[tuple[str, str], ...]], ...] = (
-    (
-        "impact force on the face",
-        "kN/m",
-        1e-3,
-        (("impact_force_x", "F₂,x, horizontal"), ("impact_force_y", "F₂,y, vertical")),
+CHARTS: dict[str, tuple[str, ...]] = {
+    "impact force on the face": ("impact_force_x", "impact_force_y"),
+    "friction": ("top_force", "base_force"),
+    "barrier velocity": ("barrier_velocity",),
+    "barrier displacement": ("barrier_displacement",),
+    "kinetic energy": ("flow_kinetic_energy", "barrier_kinetic_energy"),
+    "other energies of the flow, and work": (
+        *("flow_gravitational_energy", "flow_elastic_energy", "barrier_work", "base_friction_work"),
     ),
-    ("friction", "kN/m", 1e-3, (("top_force", "F₃, on the crest"), ("base_force", "F₄, at the base"))),
-    ("barrier velocity", "m/s", 1.0, (("barrier_velocity", "v₂"),)),
-    ("barrier displacement", "m", 1.0, (("barrier_displacement", "Δx"),)),
-    (
-        "kinetic energy",
-        "kJ/m",
-        1e-3,
-        (("flow_kinetic_energy", "Eₖ₁, flow"), ("barrier_kinetic_energy", "Eₖ₂, barrier")),
-    ),
-    (
-        "other energies of the flow, and work",
-        "kJ/m",
-        1e-3,
-        (
-            ("flow_gravitational_energy", "gravitational"),
-            ("flow_elastic_energy", "elastic"),
-            ("barrier_work", "work on the barrier"),
-            ("base_friction_work", "work of base friction"),
-        ),
-    ),
-    ("greatest pore pressure upstream of the crest", "kPa", 1e-3, (("pore_pressure_max", "p_L,max"),)),
-)
-"""Title, unit, factor from SI, and the columns of each chart."""
-
-FORCES = ("impact_force_x", "impact_force_y", "top_force", "base_force")
-"""Columns drawn as moving means, with the raw values faint behind them."""
+    "greatest pore pressure upstream of the crest": ("pore_pressure_max",),
+}
+"""Columns of each chart, of one unit; what a script records besides has a chart of its own."""
 
 CLOSED_FORM = {
     "impact_force_x": "force",
@@ -85,7 +67,11 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "end": float(series["time"][-1]),
         "peak_time": results.summary.get("peak_force_filtered_time"),
         "figures": summary_rows(results.summary),
-        "charts": [chart for chart in (_chart(series, *chart, fits) for chart in CURVES) if chart is not None],
+        "charts": [
+            chart
+            for title, names in (CHARTS | own_charts(results)).items()
+            if (chart := _chart(results, title, names, fits)) is not None
+        ],
         "closed_form": [_fit_row(fit, series) for fit in fits],
         "ledger": ledger(series, results.summary),
         "effects": {rule.effect: f"{_text(rule.value)}: {rule.reason}" for rule in effect_rules(scenario)},
@@ -113,9 +99,17 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     """What was there, what came and went, and what is not accounted for."""
     rows = []
 
-    def row(label: str, value: float | None, unit: str, factor: float = 1.0) -> None:
+    def row(label: str, value: float | None, quantity: Quantity) -> None:
         if value is not None:
-            rows.append((label, f"{value * factor:,.4g} {unit}".strip()))
+            rows.append((label, quantity.text(value).removesuffix(" -")))
+
+    def column(name: str, when: str = "", label: str = "") -> None:
+        quantity = NAMED[name]
+        label = label or " at the ".join(part for part in (quantity.words, when) if part)
+        row(label, at(name, 0 if when == "start" else -1), quantity)
+
+    def figure(name: str, more: str = "") -> None:
+        row(FIGURES[name].words + more, summary.get(name), FIGURES[name])
 
     def at(name: str, index: int) -> float | None:
         return float(series[name][index]) if name in series else None
@@ -124,26 +118,27 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
         parts = ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy")
         return sum(float(series[part][index]) for part in parts) if all(part in series for part in parts) else None
 
-    for label, name in (("mass of solid at the start", "solid_mass"), ("mass of liquid at the start", "liquid_mass")):
-        row(label, at(name, 0), "kg/m")
-    row("mass that left the domain", at("left_mass", -1), "kg/m")
-    row("error of mass, relative", summary.get("mass_error"), "")
-    row("momentum along x at the start", at("momentum_x", 0), "kN s/m", 1e-3)
-    row("momentum along x at the end", at("momentum_x", -1), "kN s/m", 1e-3)
-    row("impulse on the impacted face", summary.get("impulse"), "kN s/m", 1e-3)
-    row("error of momentum, relative", summary.get("momentum_error"), "")
+    energy = NAMED["flow_kinetic_energy"]
+    column("solid_mass", "start")
+    column("liquid_mass", "start")
+    column("left_mass")
+    figure("mass_error", ", relative")
+    column("momentum_x", "start")
+    column("momentum_x", "end")
+    figure("impulse", " on the impacted face")
+    figure("momentum_error", ", relative")
     first, last = total(0), total(-1)
-    row("energy of the flow at the start", first, "kJ/m", 1e-3)
-    row("energy of the flow at the end", last, "kJ/m", 1e-3)
-    row("work done on the barrier", at("barrier_work", -1), "kJ/m", 1e-3)
-    row("  of it taken by base friction", at("base_friction_work", -1), "kJ/m", 1e-3)
-    row("work of gravity on seepage", at("seepage_work", -1), "kJ/m", 1e-3)
-    row("energy that left the domain", at("left_energy", -1), "kJ/m", 1e-3)
+    row("energy of the flow at the start", first, energy)
+    row("energy of the flow at the end", last, energy)
+    column("barrier_work")
+    column("base_friction_work", label="  of it taken by base friction")
+    column("seepage_work")
+    column("left_energy")
     if first is not None and last is not None:
         spent = first - last - (at("barrier_work", -1) or 0.0) - (at("left_energy", -1) or 0.0)
         spent += at("seepage_work", -1) or 0.0
-        row("dissipated in the flow", spent, "kJ/m", 1e-3)
-    row("energy created, relative", summary.get("energy_error"), "")
+        row("dissipated in the flow", spent, energy)
+    figure("energy_error", ", relative")
     return rows
 
 
@@ -174,13 +169,14 @@ def _fit_row(fit: Calibration, series: Mapping[str, Array]) -> dict[str, str]:
     def percent(value: float | None) -> str:
         return "–" if value is None else f"{100 * value:.1f} %"
 
+    force, displacement = FIGURES["peak_force"], FIGURES["barrier_displacement_final"]
     return {
         "rule": fit.rule.replace("_", " "),
         "λ": f"{fit.geometry_change:.3f}" + ("" if fit.within_range else " (out of range)"),
         "τ": f"{fit.rise_ratio:.3f}",
-        "F_peak": f"{impact.peak_force / 1e3:,.0f} kN/m",
+        "F_peak": force.text(impact.peak_force, ",.0f"),
         "T₁, T₂": f"{impact.peak_time - impact.arrival_time:.3f} s, {impact.duration:.3f} s",
-        "Δx": f"{impact.barrier_displacement_final:.2f} m",
+        "Δx": displacement.text(impact.barrier_displacement_final, ".2f"),
         "misfit of F": percent(distance.force),
         "of Eₖ₁": percent(distance.flow_kinetic_energy),
         "of v₂": percent(distance.barrier_velocity),
@@ -188,30 +184,38 @@ def _fit_row(fit: Calibration, series: Mapping[str, Array]) -> dict[str, str]:
     }
 
 
-def _chart(
-    series: Mapping[str, Array],
-    title: str,
-    unit: str,
-    factor: float,
-    columns: tuple[tuple[str, str], ...],
-    fits: list[Calibration],
-) -> dict[str, Any] | None:
-    time, lines = series["time"], []
-    for number, (name, label) in enumerate(columns):
+def own_charts(results: Results) -> dict[str, tuple[str, ...]]:
+    """Charts of what a script records, beside those of the package."""
+    return {one.words: (name,) for name, one in results.quantities.items() if name not in NAMED}
+
+
+def _chart(results: Results, title: str, names: tuple[str, ...], fits: list[Calibration]) -> dict[str, Any] | None:
+    series, lines = results.time_series, []
+    time = series["time"]
+    for number, name in enumerate(names):
         if name not in series or not np.any(series[name]):
             continue
-        if name in FORCES:
-            lines.append(_line(time, series[name] * factor, f"{label}, raw", number, "faint"))
-            smooth = moving_mean(time, series[name]) * factor
-            lines.append(_line(time, smooth, f"{label}, mean over {FILTER_WINDOW:g} s", number, "solid"))
+        quantity = results.quantities[name]
+        label, values = " ".join((quantity.words, quantity.symbol)).strip(), series[name] * quantity.factor
+        if isinstance(quantity, Sampled) and quantity.mean:
+            lines.append(_line(time, values, f"{label}, raw", number, "faint"))
+            lines.append(
+                _line(time, moving_mean(time, values), f"{label}, mean over {FILTER_WINDOW:g} s", number, "solid")
+            )
         else:
-            lines.append(_line(time, series[name] * factor, label, number, "solid"))
+            lines.append(_line(time, values, label, number, "solid"))
         for style, fit in zip(("dashed", "dotted"), fits, strict=False):
             if name in CLOSED_FORM:
-                values = getattr(trajectory(fit.impact, time), CLOSED_FORM[name]) * factor
+                predicted = getattr(trajectory(fit.impact, time), CLOSED_FORM[name]) * quantity.factor
                 rule = fit.rule.replace("_", " ")
-                lines.append(_line(time, values, f"{label}: closed form, {rule}", number, style))
-    return {"title": title, "unit": unit, "lines": lines} if lines else None
+                lines.append(_line(time, predicted, f"{label}: closed form, {rule}", number, style))
+    return {"title": title, "unit": _unit(results, names), "lines": lines} if lines else None
+
+
+def _unit(results: Results, names: tuple[str, ...]) -> str:
+    """The one in which a chart's columns are shown."""
+    (unit,) = {results.quantities[name].shown_unit for name in names if name in results.quantities}
+    return unit
 
 
 def _line(time: Array, values: Array, label: str, colour: int, style: str) -> dict[str, Any]:

@@ -69,8 +69,8 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
         "fields": [
             {
                 "name": field.name,
-                "label": field.label,
-                "unit": field.unit,
+                "label": field.words,
+                "unit": field.shown_unit,
                 "signed": field.signed,
                 "scale": colour_limits(np.concatenate(column), field.signed),
             }

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from warp_mpm.quantities import TIME_SERIES
+from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.schema import Coordinate, Friction, Interval, Model, NonNegative, set_fields
 from warp_mpm.simulator.schemes import SCHEMES
 
@@ -115,7 +115,7 @@ class Output(Model):
     @classmethod
     def _known(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if names is not None:
-            known = [quantity.name for quantity in TIME_SERIES.values()]
+            known = list(NAMED)
             for name in names:
                 if name not in known:
                     raise ValueError(f"{json.dumps(name)[:80]} is not recorded; each must be one of {', '.join(known)}")

@@ -1,21 +1,28 @@
-"""What a sample of the time series tells, from the sums that the kernels keep."""
+"""What a sample of the time series is taken from: the sums that the kernels keep, at one time.
+
+What each quantity is and how it is read from here stands in `warp_mpm/quantities/time_series.py`.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from ..effects import Effects
 from ..kernels import layout as at
+from ..quantities import TIME_SERIES, Sampled, force_of_surface, quantities_of
+from ..quantities.time_series import OWN
+from ..scenario import Scenario
 from ..simulator.bodies import Body, Sliding
 
-OF_THE_LEDGER = frozenset(
-    ("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy", "speed_max",
-     "solid_mass", "liquid_mass", "pore_pressure_max", "pore_pressure_max_anywhere", "momentum_x", "momentum_y",
-     "momentum_residual_x", "momentum_residual_y")
-)  # fmt: skip
-"""Quantities that need sums over all material points."""
+
+def _entries(prefix: str) -> dict[str, int]:
+    """Places in an array of the device by name: `LEDGER_SOLID_MASS` as `solid_mass`."""
+    return {name.removeprefix(prefix).lower(): place for name, place in vars(at).items() if name.startswith(prefix)}
+
+
+_LEDGER, _LEFT = _entries("LEDGER_"), _entries("LEFT_")
+_BALANCE = {name.lower(): place for name, place in vars(at).items() if name.startswith(("GRAVITY_", "SEEPAGE_"))}
 
 
 @dataclass(frozen=True)
@@ -31,18 +38,6 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Constants:
-    """What samples need to know of a scene."""
-
-    effects: Effects
-    bodies: Sequence[Body]
-    barrier: int | None
-    """Number of the barrier among the bodies."""
-    gravity: tuple[float, float]
-    """[m/s2]."""
-
-
-@dataclass(frozen=True)
 class BarrierNow:
     """The barrier's motion at the time of a sample."""
 
@@ -54,90 +49,86 @@ class BarrierNow:
     """Of the flow on it since t = 0 [J/m]."""
     base_work: float = 0.0
     """That friction at its base has taken [J/m]."""
+    mass: float = 0.0
+    """[kg/m]; nil where it does not slide."""
+
+    @property
+    def kinetic_energy(self) -> float:
+        """[J/m]."""
+        return 0.5 * self.mass * self.velocity**2
 
 
-def sample(
-    constants: Constants,
-    now: Window,
-    since: Window,
-    *,
-    barrier: BarrierNow,
-    balance: Sequence[float],
-    clock: Sequence[float],
-    sums: Sequence[float],
-    left: Sequence[float],
-    initial_momentum: Sequence[float],
-) -> dict[str, float]:
-    """Quantities now, and forces as means over a stretch of time (impulse over its length).
+@dataclass(frozen=True)
+class Now:
+    """The scene at the time of a sample, as the readers of quantities see it."""
 
-    Args:
-        constants: of the scene.
-        now, since: totals now and at the beginning of that stretch.
-        barrier: its motion; of no matter where there is none.
-        balance: what gravity gave to the flow.
-        clock: for the time step.
-        sums: of the ledger.
-        left: what has left the domain.
-        initial_momentum: of the flow along x and y [N s/m].
-    """
-    effects, reactions = constants.effects, now.reactions
+    scenario: Scenario
+    bodies: Sequence[Body]
+    """All that the flow meets."""
+    barrier: BarrierNow
+    """Of no matter where there is none."""
+    time: float
+    """[s]."""
+    time_step: float
+    """[s]."""
+    elapsed: float
+    """Time over which forces are means [s]."""
+    forces: Mapping[str, tuple[float, float]]
+    """Mean force of the flow on each surface along x and y, by its name [N/m]."""
+    base_force: float
+    """Mean friction at the base of a sliding barrier, against its motion [N/m]."""
+    impulses: Sequence[float]
+    """Of the flow on all surfaces since t = 0, along x and y in turn [N s/m]."""
+    initial_momentum: Sequence[float]
+    """Of the flow along x and y [N s/m]."""
+    points: Callable[..., Mapping[str, Any]]
+    """`Simulation.points`: arrays of the material points, all or what is named."""
+    sums: Sequence[float]
+    departed: Sequence[float]
+    balanced: Sequence[float]
+
+    def ledger(self, entry: str) -> float:
+        """Sum over the material points: `LEDGER_...` of `kernels/layout.py`, in small letters."""
+        return self.sums[_LEDGER[entry]]
+
+    def left(self, entry: str) -> float:
+        """What has left the domain: `LEFT_...`."""
+        return self.departed[_LEFT[entry]]
+
+    def balance(self, entry: str) -> float:
+        """What gravity gave to the flow: `GRAVITY_...`, `SEEPAGE_...`."""
+        return self.balanced[_BALANCE[entry]]
+
+    @property
+    def base_normal_force(self) -> float:
+        """Mean force with which a sliding barrier presses on its base [N/m]."""
+        barrier = next(body for body in self.bodies if isinstance(body.motion, Sliding))
+        vertical = sum(self.forces[surface.name][1] for surface in barrier.surfaces)
+        return max(-self.barrier.mass * self.scenario.gravity.vector[1] - vertical, 0.0)
+
+
+def sampled_quantities(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, Sampled]:
+    """What a sample of a scene tells, by key: of the table, of a script, and forces on the surfaces of its bodies."""
+    found = {key: TIME_SERIES.get(key) or OWN[key] for key in quantities_of(scenario)}
+    for body in bodies:
+        for surface in body.surfaces:
+            for axis in ("x", "y"):
+                if not body.edge:
+                    found.setdefault(f"{surface.name}_force_{axis}", force_of_surface(surface.name, axis))
+    return found
+
+
+def wanted_quantities(known: Mapping[str, Sampled], names: Collection[str] | None) -> list[Sampled]:
+    """Those that a sample reads: what is named, or all; and all that cost nothing, so that none of them is ever no
+    number unseen."""
+    return [one for key, one in known.items() if names is None or key in names or not one.of_points]
+
+
+def mean_forces(bodies: Sequence[Body], now: Window, since: Window) -> tuple[dict[str, tuple[float, float]], float]:
+    """Mean force [N/m] on each surface by name, and at the base, between two windows: impulse over time."""
     elapsed = now.time - since.time
     rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
-    forces = [(after - before) * rate for after, before in zip(reactions, since.reactions, strict=True)]
-    values = {"time": now.time}
-    momentum_x, momentum_y = sums[at.LEDGER_MOMENTUM_X], sums[at.LEDGER_MOMENTUM_Y]
-    residual_x = momentum_x - initial_momentum[0] - balance[at.GRAVITY_IMPULSE_X] + left[at.LEFT_MOMENTUM_X]
-    residual_y = momentum_y - initial_momentum[1] - balance[at.GRAVITY_IMPULSE_Y] + left[at.LEFT_MOMENTUM_Y]
-    residual_x += sum(reactions[0::2])
-    residual_y += sum(reactions[1::2])
-    number = 0
-    for body in constants.bodies:
-        for surface in body.surfaces:
-            if not body.edge:
-                values[f"{surface.name}_force_x"] = forces[2 * number]
-                values[f"{surface.name}_force_y"] = forces[2 * number + 1]
-            number += 1
-    if constants.barrier is not None:
-        values |= {
-            "barrier_velocity": barrier.velocity,
-            "barrier_displacement": barrier.displacement,
-            "barrier_work": barrier.work,
-        }
-        body = constants.bodies[constants.barrier]
-        if isinstance(body.motion, Sliding):
-            vertical = sum(values[f"{surface.name}_force_y"] for surface in body.surfaces)
-            weight = -body.motion.mass * constants.gravity[1]
-            values |= {
-                "base_force": -(now.base_impulse - since.base_impulse) * rate,
-                "base_normal_force": max(weight - vertical, 0.0),
-                "base_friction_work": barrier.base_work,
-                "barrier_kinetic_energy": 0.5 * body.motion.mass * barrier.velocity**2,
-            }
-    values |= {
-        "flow_kinetic_energy": sums[at.LEDGER_KINETIC],
-        "flow_gravitational_energy": sums[at.LEDGER_GRAVITATIONAL],
-        "flow_elastic_energy": sums[at.LEDGER_ELASTIC],
-        "speed_max": math.sqrt(sums[at.LEDGER_SPEED_MAX]),
-        "solid_mass": sums[at.LEDGER_SOLID_MASS],
-    }
-    if effects.liquid:
-        values["pore_pressure_max_anywhere"] = sums[at.LEDGER_PRESSURE_MAX]
-        # What loads the barrier: upstream of the crest's end and meant over a cell. Where a jet lands behind it, single
-        # points meet the ground at water-hammer pressure.
-        values["pore_pressure_max"] = sums[at.LEDGER_PRESSURE_MEAN]
-    if effects.two_phase:
-        # Liquid is carried at the skeleton's points, so that its own fall through the voids is in no potential energy.
-        values["seepage_work"] = balance[at.SEEPAGE_WORK]
-        values["liquid_mass"] = sums[at.LEDGER_LIQUID_MASS]
-    values |= {
-        "momentum_x": momentum_x,
-        "momentum_y": momentum_y,
-        "momentum_residual_x": residual_x,
-        "momentum_residual_y": residual_y,
-        "left_mass": left[at.LEFT_SOLID_MASS] + left[at.LEFT_LIQUID_MASS],
-        "left_momentum_x": left[at.LEFT_MOMENTUM_X],
-        "left_momentum_y": left[at.LEFT_MOMENTUM_Y],
-        "left_energy": left[at.LEFT_ENERGY],
-        "time_step": clock[at.TIME_STEP],
-    }
-    return values
+    means = [(after - before) * rate for after, before in zip(now.reactions, since.reactions, strict=True)]
+    surfaces = [surface.name for body in bodies for surface in body.surfaces]
+    forces = {name: (means[2 * place], means[2 * place + 1]) for place, name in enumerate(surfaces)}
+    return forces, -(now.base_impulse - since.base_impulse) * rate

@@ -148,11 +148,22 @@ class Sweep(_Model):
             SweepError: it cannot be read, or asks for something impossible.
         """
         try:
-            return cls.model_validate(read_json(Path(path)))
+            content = read_json(Path(path))
         except ScenarioError as error:
             raise SweepError(str(error)) from None
+        return cls.checked(content, str(path))
+
+    @classmethod
+    def checked(cls, content: Any, name: str) -> Sweep:
+        """A sweep of the content of a file; `name` begins the sentences of what is wrong with it.
+
+        Raises:
+            SweepError: it asks for something impossible.
+        """
+        try:
+            return cls.model_validate(content)
         except ValidationError as error:
-            raise SweepError("\n".join(f"{path}: {sentence}" for sentence in sentences(error, cls))) from None
+            raise SweepError("\n".join(f"{name}: {sentence}" for sentence in sentences(error, cls))) from None
 
     @model_validator(mode="after")
     def _method_fits(self) -> Self:

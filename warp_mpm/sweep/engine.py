@@ -1,4 +1,4 @@
-"""Runs the cases of a sweep on Dask, here or on a cluster, and gathers their key figures in one table."""
+"""Runs the cases of a sweep, on Dask or in processes of this machine, and gathers their key figures in one table."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from warp_mpm.engine import Engine, Processes, SchedulerError, Task, dask_engine
 from warp_mpm.extras import missing
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.run_folder import RunFolder
@@ -21,9 +22,6 @@ from warp_mpm.sweep.design import Case, Sweep, SweepError
 SWEEP, CASES, TABLE = "sweep.json", "cases", "results.parquet"
 """What the folder of a sweep holds: the resolved sweep, a run folder for each case, the table."""
 
-ALLOWED_FAILURES = 5
-"""How many workers may die under one case before it counts as failed: a case that kills them must not go on."""
-
 Row = dict[str, Any]
 
 
@@ -34,6 +32,7 @@ def run_sweep(
     *,
     workers: int = 2,
     scheduler: str | None = None,
+    on_dask: bool = True,
     device: str = "cpu",
     retry_failed: bool = False,
     on_start: Callable[[int, int, str], None] = lambda total, done, dashboard: None,
@@ -51,6 +50,7 @@ def run_sweep(
         out: folder of the sweep; made if need be.
         workers: processes on this machine, one case at a time each.
         scheduler: address of a Dask scheduler that has workers; None starts `workers` of them here.
+        on_dask: false runs the cases in processes of this machine, without Dask; a case whose process dies has failed.
         device: of the simulations.
         retry_failed: cases that failed before are run again.
         on_start: called with the number of cases, of those done before, and the address of the dashboard or "".
@@ -63,39 +63,31 @@ def run_sweep(
     Raises:
         SweepError: Dask is not installed, a case is impossible, or the folder holds another sweep; nothing was run.
     """
-    _check_installed()
+    _check_installed(on_dask)
     out = Path(out)
     cases = sweep.cases(base)
     _claim(out, {**sweep.model_dump(mode="json"), "scenario": base.resolved()})
     done = {case.number: row for case in cases if (row := _row_of(case, out, retry_failed)) is not None}
     waiting = [case for case in cases if case.number not in done]
-    with _client(workers, scheduler) as client:
-        on_start(len(cases), len(done), getattr(client, "dashboard_link", "") or "")
-        from distributed import as_completed
-
-        futures = {
-            client.submit(
-                run_case,
-                case.scenario.resolved(),
-                str(_folder(case, out).resolve()),
-                device,
-                make_simulation,
-                key=f"case-{case.name}-{id(client)}",
-                pure=False,
-            ): case
-            for case in waiting
-        }
+    tasks = {
+        case.name: Task(
+            case.name,
+            run_case,
+            (case.scenario.resolved(), str(_folder(case, out).resolve()), device, make_simulation),
+        )
+        for case in waiting
+    }
+    by_name = {case.name: case for case in waiting}
+    with _engine(workers, scheduler, on_dask=on_dask) as (engine, dashboard):
+        on_start(len(cases), len(done), dashboard)
         try:
-            for future in as_completed(futures):
-                case = futures[future]
-                problem = future.result() if future.status == "finished" else _problem(future)
+            for ended in engine.run(list(tasks.values())):
+                case = by_name[ended.task.name]
+                problem = ended.problem or ended.result
                 row = _row_of(case, out, retry_failed=False) or _row(case, "failed", problem, {})
                 done[case.number] = row
                 on_case(row)
         finally:
-            for future in futures:
-                with contextlib.suppress(Exception):  # the scheduler may be gone
-                    future.cancel()
             rows = [done[number] for number in sorted(done)]
             write_table(rows, out / TABLE)
     return rows
@@ -196,50 +188,31 @@ def _row(case: Case, status: str, problem: str | None, summary: dict[str, Any]) 
     return {"case": case.number, "status": status, "problem": problem, **case.values, **figures}
 
 
-def _problem(future: Any) -> str:
-    try:
-        error = future.exception(timeout=5)
-    except Exception as unknown:
-        error = unknown
-    return f"{type(error).__name__}: {error}"
-
-
-def _check_installed() -> None:
+def _check_installed(on_dask: bool) -> None:
     """Ask for the optional packages before hours of runs, not after.
 
     Raises:
         SweepError: one is not installed.
     """
     try:
-        for package in ("distributed", "pandas", "pyarrow"):
+        for package in (*(("distributed",) if on_dask else ()), "pandas", "pyarrow"):
             import_module(package)
     except ModuleNotFoundError:
         raise SweepError(missing("sweep", "Dask, pandas and pyarrow", "sweep")) from None
 
 
 @contextmanager
-def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
-    """A connection to a scheduler that has workers.
+def _engine(workers: int, scheduler: str | None, *, on_dask: bool) -> Iterator[tuple[Engine, str]]:
+    """What runs the cases, and the address of its dashboard or "".
 
     Raises:
         SweepError: the scheduler does not answer.
     """
-    import dask
-    import distributed
-
-    with dask.config.set({"distributed.scheduler.allowed-failures": ALLOWED_FAILURES}):
-        if scheduler is not None:
-            try:
-                client = distributed.Client(scheduler, timeout="10s")
-            except (OSError, ValueError) as error:
-                raise SweepError(f"--scheduler {scheduler} does not answer: {error}.") from None
-            with client:
-                yield client
-            return
-        with (
-            distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            yield client
+    if not on_dask:
+        yield Processes(workers), ""
+        return
+    try:
+        with dask_engine(workers, scheduler) as engine:
+            yield engine
+    except SchedulerError as error:
+        raise SweepError(str(error)) from None

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from warp_mpm.validation import columns, contact, elements, granular, jets, paper, phases, refinement, shallow_water
+from warp_mpm.validation import (
+    at_rest,
+    case_one,
+    columns,
+    contact,
+    elements,
+    free_motion,
+    granular,
+    jets,
+    paper,
+    phases,
+    refinement,
+    shallow_water,
+)
 from warp_mpm.validation.case import Case
 
 CASES: tuple[Case, ...] = (
@@ -12,9 +25,12 @@ CASES: tuple[Case, ...] = (
     *columns.CASES,
     *phases.CASES,
     *contact.CASES,
+    *at_rest.CASES,
+    *free_motion.CASES,
     *jets.CASES,
     *shallow_water.CASES,
     *granular.CASES,
+    *case_one.CASES,
     *refinement.CASES,
     *paper.CASES,
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from analytic.force_record import cumulative_impulse, moving_mean
 from warp_mpm.effect_rules import with_law
+from warp_mpm.recording import Schedule, SeriesInMemory, record_until
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
@@ -121,9 +122,6 @@ def paper_runs(names: Mapping[str, float]) -> Iterator[dict[str, PaperRun]]:
 
 def force_history(scenario: Scenario, interval: float) -> tuple[dict[str, Array], Simulation]:
     """Samples of a scene every `interval` [s] until its end, and the simulation at the end."""
-    simulation = Simulation(scenario)
-    samples = [simulation.sample()]
-    for number in range(1, round(scenario.output.end_time_s / interval) + 1):
-        simulation.advance(number * interval)
-        samples.append(simulation.sample())
-    return {name: np.array([sample[name] for sample in samples]) for name in samples[0]}, simulation
+    simulation, recorder = Simulation(scenario), SeriesInMemory(Schedule(interval))
+    record_until(simulation, [recorder], scenario.output.end_time_s)
+    return recorder.series(), simulation

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
+from warp_mpm.recording import Moments, SeriesInMemory, record_until
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.validation.case import Array
@@ -110,11 +109,10 @@ def fixed(shape: dict[str, Any], friction: float = 0.0) -> dict[str, Any]:
 
 def sampled(simulation: Simulation, times: Iterable[float]) -> dict[str, Array]:
     """Samples at `times`, by quantity; forces are means over the interval before."""
-    samples = []
-    for time in times:
-        simulation.advance(float(time))
-        samples.append(simulation.sample())
-    return {name: np.array([sample[name] for sample in samples]) for name in samples[0]}
+    moments = Moments(times)
+    recorder = SeriesInMemory(moments)
+    record_until(simulation, [recorder], moments.times[-1])
+    return recorder.series()
 
 
 def layers(values: Array, number: int) -> Array:

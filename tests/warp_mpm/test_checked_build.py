@@ -1,0 +1,49 @@
+"""The build of the kernels for debugging: an index outside its array ends the process and says where."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+REPOSITORY = Path(__file__).parents[2]
+
+PROGRAM = """
+import sys
+from warp_mpm import Scenario, Simulation
+
+scenario = Scenario.load(sys.argv[1]).replaced({"numerics.spacing_m": 1.0, "output.end_time_s": 0.2})
+simulation = Simulation(scenario)
+simulation.advance(0.1)
+print("energy", simulation.sample()["flow_kinetic_energy"], flush=True)
+if sys.argv[2] == "thrown":
+    position = simulation._point_arrays["position"].numpy()
+    position[0] = (1e4, 1e4)  # outside the grid, where `advect` lets no point be
+    simulation.advance(0.2)
+"""
+
+
+def run(how, **environment):
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM, REPOSITORY / "scenarios/case_1.json", how],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def energy(done):
+    return float(done.stdout.split()[1])
+
+
+def test_an_index_outside_its_array_is_named():
+    done = run("thrown", WARP_MPM_CHECKED="1")
+    assert done.returncode != 0
+    assert "Assertion failed: 'p >= 0 && p <" in done.stderr
+    assert "warp_mpm/" in done.stderr  # the kernel's file and line
+
+
+def test_a_scene_runs_through_and_to_the_same_numbers():
+    checked, plain = run("", WARP_MPM_CHECKED="1"), run("", WARP_MPM_CHECKED="0")
+    assert checked.returncode == plain.returncode == 0, checked.stderr
+    assert abs(energy(checked) / energy(plain) - 1.0) < 1e-12  # another compiler's level, another rounding

@@ -1,0 +1,246 @@
+"""Many runs: each task in a process of its own, since Warp's CPU backend uses one core for one scene; or on Dask.
+
+Whatever runs many scenes goes through here: `run A.json B.json`, studies of accuracy, sweeps.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Any, Protocol
+
+POLL = 0.2
+"""Time between looks at what runs [s]."""
+
+ALLOWED_FAILURES = 5
+"""How many of Dask's workers may die under a task before it counts as failed: one that kills them must not go on."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call of a function of a module, with arguments that can be sent to another process."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a task ended."""
+
+    task: Task
+    result: Any
+    """What the function returned; None where there is a problem."""
+    problem: str | None = None
+    """What it raised, or that its process died; one sentence."""
+    died: bool = False
+    """Whether its process died, for want of memory say."""
+    exit_code: int | None = None
+    """Of a process that died; less than 0: what signal ended it."""
+
+
+class Engine(Protocol):
+    """Runs tasks, some at once."""
+
+    def run(
+        self,
+        tasks: Sequence[Task],
+        *,
+        on_start: Callable[[Task], None] = lambda task: None,
+        on_look: Callable[[Task], None] = lambda task: None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Iterator[Ended]:
+        """The ends of the tasks, as they come. Whoever breaks off ends what runs.
+
+        Args:
+            tasks: in the order in which they begin.
+            on_start: called as a task begins.
+            on_look: called for each running task, now and then.
+            stop: asked now and then; true asks the running tasks to end (SIGTERM) and begins no more.
+        """
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Processes of this machine, one for each task; a task that dies takes no other with it."""
+
+    at_once: int
+
+    def run(
+        self,
+        tasks: Sequence[Task],
+        *,
+        on_start: Callable[[Task], None] = lambda task: None,
+        on_look: Callable[[Task], None] = lambda task: None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Iterator[Ended]:
+        """As of any engine."""
+        context = multiprocessing.get_context("spawn")  # Warp's state does not survive a fork
+        waiting = list(tasks)
+        running: dict[Connection, tuple[Task, SpawnProcess]] = {}
+        told = False
+        try:
+            while running or (waiting and not stop()):
+                while waiting and len(running) < self.at_once and not stop():
+                    task = waiting.pop(0)
+                    ours, theirs = context.Pipe(duplex=False)
+                    process = context.Process(
+                        target=_work, args=(theirs, task.function, task.arguments), name=task.name
+                    )
+                    with _held_ctrl_c():
+                        process.start()
+                    theirs.close()
+                    running[ours] = task, process
+                    on_start(task)
+                ready = wait(list(running), timeout=POLL)
+                if stop() and not told:
+                    told = True
+                    for _, process in running.values():
+                        process.terminate()
+                for pipe in ready:
+                    assert isinstance(pipe, Connection)
+                    task, process = running.pop(pipe)
+                    yield _ended(task, process, pipe)
+                for task, _ in running.values():
+                    on_look(task)
+        finally:
+            for pipe, (_, process) in running.items():
+                process.terminate()
+                pipe.close()
+
+
+@dataclass(frozen=True)
+class Dask:
+    """The workers of a Dask scheduler; what a worker that died was at is run again by another."""
+
+    client: Any
+
+    def run(
+        self,
+        tasks: Sequence[Task],
+        *,
+        on_start: Callable[[Task], None] = lambda task: None,
+        on_look: Callable[[Task], None] = lambda task: None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Iterator[Ended]:
+        """As of any engine; tasks begin and are looked at where the workers are, so that nothing is told of that."""
+        from distributed import as_completed
+
+        futures = {
+            self.client.submit(
+                task.function, *task.arguments, key=f"{task.name}-{id(self.client)}-{place}", pure=False
+            ): task
+            for place, task in enumerate(tasks)
+        }
+        try:
+            for future in as_completed(futures):
+                if future.status == "finished":
+                    yield Ended(futures[future], future.result())
+                else:
+                    yield Ended(futures[future], None, _problem(future), died=True)
+                if stop():
+                    return
+        finally:
+            for future in futures:
+                with contextlib.suppress(Exception):  # the scheduler may be gone
+                    future.cancel()
+
+
+class SchedulerError(ValueError):
+    """A Dask scheduler that does not answer; one sentence."""
+
+
+@contextmanager
+def dask_engine(workers: int, scheduler: str | None) -> Iterator[tuple[Dask, str]]:
+    """Dask on the workers of a scheduler, or on `workers` processes of this machine, and the address of its dashboard.
+
+    Raises:
+        SchedulerError: the scheduler does not answer.
+    """
+    import dask
+    import distributed
+
+    with contextlib.ExitStack() as opened:
+        opened.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": ALLOWED_FAILURES}))
+        if scheduler is not None:
+            try:
+                client = opened.enter_context(distributed.Client(scheduler, timeout="10s"))
+            except (OSError, ValueError) as error:
+                raise SchedulerError(f"--scheduler {scheduler} does not answer: {error}.") from None
+        else:
+            cluster = opened.enter_context(
+                distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+                )
+            )
+            client = opened.enter_context(distributed.Client(cluster))
+        yield Dask(client), getattr(client, "dashboard_link", "") or ""
+
+
+@contextmanager
+def _held_ctrl_c() -> Iterator[None]:
+    """Hear Ctrl-C only afterwards; a process that is begun meanwhile does not hear it before `_work`."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # whose start would let it through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _work(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    """Of a process: the task, and how it ended."""
+    if hasattr(os, "setsid"):
+        # Ctrl-C is for the process that began this one, which passes it on once.
+        os.setsid()
+        heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # drops one that came before
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, heard)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    result, problem = None, None
+    try:
+        result = function(*arguments)
+    except Exception as error:
+        problem = f"{type(error).__name__}: {error}"
+    with contextlib.suppress(BrokenPipeError):  # nobody waits for it any more
+        pipe.send((result, problem))
+
+
+def _end_with_parent() -> None:
+    """Of a thread: end this process when the one that began it is gone, killed say, as if it had been asked to."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _ended(task: Task, process: SpawnProcess, pipe: Connection) -> Ended:
+    try:
+        result, problem = pipe.recv()
+        died = False
+    except EOFError:
+        result, problem, died = None, "the process died, for want of memory perhaps", True
+    pipe.close()
+    process.join()
+    return Ended(task, result, problem, died, process.exitcode if died else None)
+
+
+def _problem(future: Any) -> str:
+    try:
+        error = future.exception(timeout=5)
+    except Exception as unknown:
+        error = unknown
+    return f"{type(error).__name__}: {error}"

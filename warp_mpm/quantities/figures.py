@@ -1,0 +1,147 @@
+"""Key figures of a run, as in `summary.json`: what they are called, how they are taken, what they need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from analytic.force_record import END_SHARE, FILTER_WINDOW, RESIDUAL_SHARE, SETTLED_SHARE, START_SHARE
+
+from .quantity import Quantity
+
+
+@dataclass(frozen=True)
+class Figure(Quantity):
+    """A number that sums up a run."""
+
+    needs: tuple[str, ...] = ()
+    """Names of the columns of the time series without which it is not known."""
+    short: str = ""
+    """For the heading of a column of a table; empty: the symbol, or the words."""
+
+    @property
+    def column(self) -> str:
+        """Heading of a column of a table: short, with the unit in which people read it."""
+        return f"{self.short or self.symbol or self.words} [{self.shown_unit}]"
+
+
+FORCE = ("impact_force_x",)
+
+_ROWS = (
+    Figure(
+        "peak_force", "N/m",
+        "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
+        "its time is the end of that interval; where force_still_rises, that so far, at least",
+        "peak force", needs=FORCE,
+    ),
+    Figure("peak_force_time", "s", "end of the interval of peak_force", "time of the peak"),
+    Figure(
+        "peak_force_filtered", "N/m", f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
+        f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=FORCE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
+    ),
+    Figure(
+        "force_still_rises", "-", "whether that moving mean is greatest where the run ends; null without an impact",
+    ),
+    Figure(
+        "impact_start_time", "s", f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
+        "impact from", needs=FORCE,
+    ),
+    Figure(
+        "rise_time", "s", "T1: peak_force_filtered_time less impact_start_time; null where force_still_rises",
+        "rise time", "T₁", needs=FORCE,
+    ),
+    Figure(
+        "residual_force", "N/m", f"mean force over the last {RESIDUAL_SHARE:.0%} of the run", "residual force",
+        needs=FORCE,
+    ),
+    Figure(
+        "impact_end_time", "s",
+        "first time after the peak from which the filtered force, less the residual force, stays below "
+        f"{END_SHARE:.0%} of the filtered peak less the residual force; null where that is only in the last "
+        f"{RESIDUAL_SHARE:.0%} of the run, or the force has not settled by then: residual_force is above "
+        f"{SETTLED_SHARE:.0%} of the filtered peak and, at the rate of its last change, would change by more than "
+        f"{END_SHARE:.0%} of that peak in as long as the impact has lasted",
+    ),
+    Figure(
+        "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=FORCE,
+    ),
+    Figure(
+        "impulse", "N s/m", "time integral of the horizontal force on the impacted face over the whole run",
+        "impulse", needs=FORCE,
+    ),
+    Figure(
+        "impact_impulse", "N s/m", "the same from impact_start_time to impact_end_time", "impulse until T₂",
+        needs=FORCE,
+    ),
+    Figure(
+        "barrier_velocity_max", "m/s", "greatest velocity downstream; 0 of a barrier that only slides upstream",
+        "greatest barrier velocity", needs=("barrier_velocity",), short="v₂,max",
+    ),
+    Figure(
+        "barrier_displacement_final", "m", "at the end of the run; not final unless barrier_at_rest",
+        "sliding distance", "Δx", needs=("barrier_displacement",),
+    ),
+    Figure(
+        "barrier_velocity_final", "m/s", "velocity of the barrier at the end of the run", needs=("barrier_velocity",),
+    ),
+    Figure(
+        "barrier_at_rest", "-", "whether a sliding barrier stands still at the end of the run",
+        needs=("barrier_velocity",),
+    ),
+    Figure(
+        "pore_pressure_max", "Pa",
+        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
+        "noise about the mean over a cell",
+        "greatest pore pressure", needs=("pore_pressure_max",),
+    ),
+    Figure(
+        "pore_pressure_max_anywhere", "Pa",
+        "greatest pore pressure of any single material point, noise and jets included",
+        "greatest pore pressure of a point", needs=("pore_pressure_max_anywhere",),
+    ),
+    Figure(
+        "retained_volume", "m3/m", "material upstream of the crest at the end, at the flow's initial density",
+        "volume retained", short="retained",
+    ),
+    Figure(
+        "on_crest_volume", "m3/m", "material above the crest at the end", "volume on the crest",
+        short="on the crest",
+    ),
+    Figure(
+        "overtopped_volume", "m3/m",
+        "material beyond the crest at the end; left_volume is what has left the domain",
+        "volume overtopped", short="beyond",
+    ),
+    Figure(
+        "mass_error", "-",
+        "greatest change of the mass of both phases, inside and departed together, over the initial mass",
+        "error of mass", needs=("solid_mass", "liquid_mass", "left_mass"),
+    ),
+    Figure(
+        "momentum_error", "-",
+        "greatest momentum not accounted for by the recorded impulses, over the greatest of the flow's "
+        "momentum and the impulse of its weight",
+        "error of momentum",
+        needs=(
+            *("momentum_residual_x", "momentum_residual_y", "momentum_x", "momentum_y", "solid_mass", "liquid_mass"),
+        ),
+    ),
+    Figure(
+        "energy_error", "-",
+        "greatest energy that appeared beyond what was there at the start less the work done on the "
+        "barrier and beyond gravity's work on liquid that seeps, over the flow's initial energy; plastic flow and drag "
+        "only take energy away",
+        "energy created",
+        needs=(
+            *("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy"),
+            *("left_energy", "barrier_work", "seepage_work"),
+        ),
+    ),
+    Figure("wall_time", "s", "wall time of the run, its preparation left out", "wall time"),
+)  # fmt: skip
+
+FIGURES: Mapping[str, Figure] = {row.name: row for row in _ROWS}
+"""Key figures by name."""
+
+NEEDED: Mapping[str, tuple[str, ...]] = {figure.name: figure.needs for figure in _ROWS if figure.needs}
+"""Columns of the time series that a figure is taken from."""

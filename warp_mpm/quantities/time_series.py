@@ -1,0 +1,248 @@
+"""Quantities of the time series: what they are called, what they mean, which scenes have them, how they are read.
+
+The order is that of the columns of `timeseries.csv`. Names are a contract with the readers of run folders.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from .quantity import Quantity, Sampled
+
+Reader = Callable[[Any], float]
+
+
+def barrier(scenario: Any) -> bool:
+    """Scenes with a barrier."""
+    return scenario.barrier is not None
+
+
+def sliding(scenario: Any) -> bool:
+    """Scenes whose barrier slides."""
+    return barrier(scenario) and scenario.barrier.motion.kind == "sliding"
+
+
+def ground(scenario: Any) -> bool:
+    """Scenes with a ground."""
+    return scenario.ground is not None
+
+
+def liquid(scenario: Any) -> bool:
+    """Flows that hold liquid."""
+    return scenario.flow.formulation != "dry"
+
+
+def two_phases(scenario: Any) -> bool:
+    """Flows whose liquid has a velocity of its own."""
+    return scenario.flow.formulation == "two_phase"
+
+
+def _force(surface: str, axis: str) -> Reader:
+    place = "xy".index(axis)
+    return lambda now: now.forces[surface][place]
+
+
+def _sum(entry: str) -> Reader:
+    return lambda now: now.ledger(entry)
+
+
+def _left(entry: str) -> Reader:
+    return lambda now: now.left(entry)
+
+
+def _residual(axis: str) -> Reader:
+    """Momentum, less its start and gravity's, plus what left and what the flow gave to the bodies."""
+    place = "xy".index(axis)
+
+    def read(now: Any) -> float:
+        residual = now.ledger(f"momentum_{axis}") - now.initial_momentum[place]
+        residual -= now.balance(f"gravity_impulse_{axis}")
+        residual += now.left(f"momentum_{axis}")
+        return residual + sum(now.impulses[place::2])
+
+    return read
+
+
+def force_of_surface(surface: str, axis: str) -> Sampled:
+    """Force on the surface of a body that a script adds: `NAME_force_x`, `NAME_force_y`."""
+    meaning = f"force of the flow on {surface} along {axis}; mean over the interval"
+    words = f"force on {surface} along {axis}"
+    name = f"{surface}_force_{axis}"
+    return Sampled(name, "N/m", meaning, words, read=_force(surface, axis), of_points=False, mean=True)
+
+
+_ROWS = (
+    Sampled(
+        "time", "s", "simulated time at the end of the interval",
+        read=lambda now: now.time, of_points=False,
+    ),
+    Sampled(
+        "impact_force_x", "N/m",
+        "force of the flow on the impacted face, F_2x; mean over the interval; + pushes downstream",
+        "horizontal impact force", "F₂,x", read=_force("impact", "x"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(
+        "impact_force_y", "N/m",
+        "force of the flow on the impacted face along y, F_2y; mean over the interval; + lifts the barrier",
+        "vertical impact force", "F₂,y", read=_force("impact", "y"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(  # the crest is level, so its force along x is the paper's F_3
+        "top_force", "N/m", "force of the flow on the crest along x, F_3; mean over the interval",
+        "friction on the crest", "F₃", key="top_force_x",
+        read=_force("top", "x"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(
+        "top_force_y", "N/m", "force of the flow on the crest along y; mean over the interval; - presses on the crest",
+        "vertical force on the crest", read=_force("top", "y"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(
+        "back_force_x", "N/m", "force of the flow on the downstream side along x; mean over the interval",
+        "horizontal force on the downstream side",
+        read=_force("back", "x"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(
+        "back_force_y", "N/m", "force of the flow on the downstream side along y; mean over the interval",
+        "vertical force on the downstream side",
+        read=_force("back", "y"), there=barrier, of_points=False, mean=True,
+    ),
+    Sampled(
+        "ground_force_x", "N/m", "force of the flow on the ground along x, F_1; mean over the interval",
+        "friction on the ground", "F₁", read=_force("ground", "x"), there=ground, of_points=False, mean=True,
+    ),
+    Sampled(
+        "ground_force_y", "N/m",
+        "force of the flow on the ground along y; mean over the interval; - presses on the ground",
+        "vertical force on the ground",
+        read=_force("ground", "y"), there=ground, of_points=False, mean=True,
+    ),
+    Sampled(
+        "base_force", "N/m",
+        "friction of the base soil on the barrier, F_4; mean over the interval; + resists sliding",
+        "friction at the base", "F₄", read=lambda now: now.base_force, there=sliding, of_points=False, mean=True,
+    ),
+    Sampled(
+        "base_normal_force", "N/m", "force with which the barrier presses on its base; mean over the interval",
+        "normal force at the base", read=lambda now: now.base_normal_force, there=sliding, of_points=False, mean=True,
+    ),
+    Sampled(
+        "barrier_velocity", "m/s", "velocity of the barrier along x, v_2", "barrier velocity", "v₂",
+        read=lambda now: now.barrier.velocity, there=barrier, of_points=False,
+    ),
+    Sampled(
+        "barrier_displacement", "m", "displacement of the barrier along x, Δx", "barrier displacement", "Δx",
+        read=lambda now: now.barrier.displacement, there=barrier, of_points=False,
+    ),
+    Sampled(
+        "flow_kinetic_energy", "J/m", "kinetic energy of both phases of the flow, E_k1",
+        "kinetic energy of the flow", "Eₖ₁", read=_sum("kinetic"),
+    ),
+    Sampled(
+        "flow_gravitational_energy", "J/m", "potential energy of the flow, zero at the origin",
+        "potential energy of the flow", read=_sum("gravitational"),
+    ),
+    Sampled(
+        "flow_elastic_energy", "J/m", "elastic energy of the skeleton and the liquid",
+        "elastic energy of the flow", read=_sum("elastic"),
+    ),
+    Sampled(
+        # Liquid is carried at the skeleton's points, so that its own fall through the voids is in no potential energy.
+        "seepage_work", "J/m",
+        "work of gravity since t = 0 on liquid that moves through the skeleton, whose place in the potential energy is "
+        "the skeleton's",
+        "work of gravity on seepage", read=lambda now: now.balance("seepage_work"), there=two_phases, of_points=False,
+    ),
+    Sampled(
+        "barrier_kinetic_energy", "J/m", "kinetic energy of the barrier, E_k2", "kinetic energy of the barrier", "Eₖ₂",
+        read=lambda now: now.barrier.kinetic_energy, there=sliding, of_points=False,
+    ),
+    Sampled(
+        "barrier_work", "J/m", "work done by the flow on the barrier since t = 0", "work done on the barrier",
+        read=lambda now: now.barrier.work, there=barrier, of_points=False,
+    ),
+    Sampled(
+        "base_friction_work", "J/m", "work that friction at the barrier's base has taken since t = 0",
+        "work taken by base friction", read=lambda now: now.barrier.base_work, there=sliding, of_points=False,
+    ),
+    Sampled(
+        # What loads the barrier: upstream of the crest's end and meant over a cell. Where a jet lands behind it, single
+        # points meet the ground at water-hammer pressure.
+        "pore_pressure_max", "Pa",
+        "greatest pore pressure upstream of the crest, meant over a cell, p_L,max, compression positive",
+        "greatest pore pressure", "p_L,max", read=_sum("pressure_mean"), there=liquid,
+    ),
+    Sampled(
+        "pore_pressure_max_anywhere", "Pa",
+        "greatest pore pressure of any material point, a landing jet's included",
+        "greatest pore pressure of any point", read=_sum("pressure_max"), there=liquid,
+    ),
+    Sampled(
+        "speed_max", "m/s", "greatest speed of any material point, either phase", "greatest speed",
+        read=lambda now: math.sqrt(now.ledger("speed_max")),
+    ),
+    Sampled(
+        "solid_mass", "kg/m", "mass of solid in the domain", "mass of solid", read=_sum("solid_mass"),
+    ),
+    Sampled(
+        "liquid_mass", "kg/m", "mass of liquid in the domain", "mass of liquid",
+        read=_sum("liquid_mass"), there=two_phases,
+    ),
+    Sampled(
+        "momentum_x", "N s/m", "momentum of the flow along x", "horizontal momentum of the flow",
+        read=_sum("momentum_x"),
+    ),
+    Sampled(
+        "momentum_y", "N s/m", "momentum of the flow along y", "vertical momentum of the flow", read=_sum("momentum_y"),
+    ),
+    Sampled(
+        "momentum_residual_x", "N s/m", "momentum along x, less its start, less all recorded impulses",
+        "horizontal momentum not accounted for", read=_residual("x"),
+    ),
+    Sampled(
+        "momentum_residual_y", "N s/m", "momentum along y, less its start, less all recorded impulses",
+        "vertical momentum not accounted for", read=_residual("y"),
+    ),
+    Sampled(
+        "left_mass", "kg/m", "mass of both phases that has left the domain since t = 0", "mass that left the domain",
+        read=lambda now: now.left("solid_mass") + now.left("liquid_mass"), of_points=False,
+    ),
+    Sampled(
+        "left_momentum_x", "N s/m", "momentum along x that has left the domain with the mass",
+        "horizontal momentum that left the domain", read=_left("momentum_x"), of_points=False,
+    ),
+    Sampled(
+        "left_momentum_y", "N s/m", "momentum along y that has left the domain with the mass",
+        "vertical momentum that left the domain",
+        read=_left("momentum_y"), of_points=False,
+    ),
+    Sampled(
+        "left_energy", "J/m", "kinetic, potential and elastic energy that has left the domain with the mass",
+        "energy that left the domain", read=_left("energy"), of_points=False,
+    ),
+    Sampled(
+        "time_step", "s", "time step at the end of the interval", "time step",
+        read=lambda now: now.time_step, of_points=False,
+    ),
+)  # fmt: skip
+
+TIME_SERIES: Mapping[str, Sampled] = {row.key: row for row in _ROWS}
+"""Columns of `timeseries.csv`, by their keys in the simulation's samples."""
+
+NAMED: Mapping[str, Sampled] = {row.name: row for row in _ROWS}
+"""The same by their names."""
+
+
+def quantity_of_column(name: str) -> Quantity | None:
+    """Of a column of `timeseries.csv` by its name: of the table, of a script, or a force on a surface of its bodies;
+    None where there is no such column."""
+    if name in NAMED:
+        return NAMED[name]
+    if name in OWN:
+        return OWN[name]
+    surface, _, axis = name.rpartition("_force_")
+    return force_of_surface(surface, axis) if surface and axis in ("x", "y") else None
+
+
+OWN: dict[str, Sampled] = {}
+"""Quantities that a script brought, by their names: see `warp_mpm.quantities.register`."""
