@@ -28,7 +28,7 @@ class Blend(Aflip):
     title = "affine-augmented FLIP as published, its velocities' loss a rate"
     settings = Settings
 
-    def numbers(self, numerics, *, sound_speed):
+    def numbers(self, numerics, *, sound_speed, flow_speed):
         return {"pic_rate": numerics.blend_rate * sound_speed / numerics.spacing_m}
 
     def functions(self, types, tools):

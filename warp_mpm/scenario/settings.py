@@ -72,7 +72,7 @@ class Numerics(Model):
     density_correction: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
     """Share of the crowding of points (cells that hold more than there is room for, where a flow is stirred) that is
     undone per unit of shear strain; 0 lets it grow. Needs volumetric_smoothing."""
-    pressure_relaxation: NonNegative = 0.1
+    pressure_relaxation: NonNegative = 0.2
     """Rate at which the noise of point pressures about their grid average decays, per sound crossing of a cell [-]."""
     bulk_viscosity: Annotated[float, Field(ge=0.0, le=2.0)] = 0.2
     """Artificial viscosity on compression, as a share b of rho c d (density, sound speed, spacing); 0 is none."""

@@ -66,7 +66,7 @@ def _grid_and_clock(
         "courant_number": numerics.courant_number,
         "largest_stable_step": limits.largest_step,
         "largest_stable_step_counter": at.LIMIT_LAW if limits.law_step < limits.drag_step else at.LIMIT_DRAG,
-    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed)
+    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.speed)
 
 
 def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from .scheme import Array
 
 class Settings(Model):
     transfer_damping: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    """With aflip: rate β at which points are drawn to the nodes' velocity, per sound crossing of a cell [-]. The less,
+    """With aflip: rate β at which points are drawn to the nodes' velocity, while sound crosses a cell [-]. The less,
     the more noise is left: below 0.1 it may grow."""
 
 
@@ -23,10 +23,10 @@ class Aflip(Flip):
 
     With the nodes' velocity v_g and gain Δv_g, both at the point, and their first moments C_g and ΔC_g,
 
-        v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c / d) Δt.
+        v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c + v_0) Δt / d.
 
-    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate β c / d,
-    with the speed of sound c and the spacing d: without it, velocity and affine field keep their energy, as both gain
+    Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate
+    β (c + v_0) / d, with the speed of sound c, that of the flow at the start v_0 and the spacing d: without it, velocity and affine field keep their energy, as both gain
     by the transpose of what they give.
     """
 
@@ -36,8 +36,8 @@ class Aflip(Flip):
     point_fields = Flip.point_fields | Apic.point_fields
     keeps_affine_field = True
 
-    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
-        return {"pic_rate": numerics.transfer_damping * (sound_speed / numerics.spacing_m)}
+    def numbers(self, numerics: Any, *, sound_speed: float, flow_speed: float) -> dict[str, float]:
+        return {"pic_rate": numerics.transfer_damping * ((sound_speed + flow_speed) / numerics.spacing_m)}
 
     def fitted(self, places: Array, spacing: float, masses: Array, velocities: Array) -> dict[str, Array]:
         return affine_field(places, spacing, masses, velocities)

@@ -56,7 +56,7 @@ class Flip(Scheme):
     grid_fields = {"force": "V", "increment": "V"}  # noqa: RUF012
     constants = ("pic_rate",)
 
-    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
+    def numbers(self, numerics: Any, *, sound_speed: float, flow_speed: float) -> dict[str, float]:
         return {"pic_rate": numerics.pic_share * (sound_speed / numerics.spacing_m)}
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:

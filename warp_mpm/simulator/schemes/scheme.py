@@ -39,12 +39,13 @@ class Scheme:
     """Whether a point alone on its nodes keeps its rate of strain from step to step, which makes it more stable
     (`time_step.lone_point_courant_number`)."""
 
-    def numbers(self, numerics: Any, *, sound_speed: float) -> dict[str, float]:
+    def numbers(self, numerics: Any, *, sound_speed: float, flow_speed: float) -> dict[str, float]:
         """Values of `constants`.
 
         Args:
             numerics: of the scenario, with the fields of `settings`.
             sound_speed: in the material as a whole [m/s].
+            flow_speed: at the start [m/s].
         """
         return {}
 
