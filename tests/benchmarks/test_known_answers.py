@@ -17,12 +17,12 @@ KNOWN_SHORT = {
     "rotation": ("5 cells a radius, Courant number 0.95: angular momentum",),
     # 1.7 to 2 % of the displacement at the full step, 1.3 % at the half: of the first order in the time step.
     "time-step": ("case 1: displacement at the end",),
-    # 6 % in the very cell, 1 % in the one after it.
-    # What the nodes do not see of dust's velocity, where nothing sounds, dies away as the flow crosses some cells: after
-    # 4 s a twentieth of what shall be lost is still there.
+    # What the nodes do not see of dust's velocity, where nothing sounds, dies away as the flow crosses some cells:
+    # after 4 s a twentieth of what shall be lost is still there.
     "collision": ("slab: kinetic energy lost",),
     # 2.5 % on the coarse grid of the quick variant, 0.2 % on the full one.
     "saturated-wave": ("σ' behind both",),
+    # 6 % in the very cell, 1 % in the one after it.
     "face-friction": ("0.2 m: T/(N tan δ) on the face, over the material's share in the cell at the face",),
 }
 """Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
