@@ -26,8 +26,8 @@ class Aflip(Flip):
         v ← v + Δv_g + s (v_g - v - Δv_g),  C ← C + ΔC_g + s (C_g - C - ΔC_g),  s = β (c + v_0) Δt / d.
 
     Fei et al. set C to C_g in every step, and give s as a number. Here all that is lost is lost at the rate
-    β (c + v_0) / d, with the speed of sound c, that of the flow at the start v_0 and the spacing d: without it, velocity
-    and affine field keep their energy, as both gain by the transpose of what they give.
+    β (c + v_0) / d, with the speed of sound c, that of the flow at the start v_0 and the spacing d: without it,
+    velocity and affine field keep their energy, as both gain by the transpose of what they give.
     """
 
     name = "aflip"
