@@ -278,7 +278,8 @@ def test_aflip_gains_what_the_nodes_gain_and_is_drawn_to_what_they_have(augmente
     nodes, increment = random_velocities(bench), random_velocities(bench, seed=6)
     velocity, affine = gathered(bench, nodes, increment)
     (mean, slope), (gain, gain_slope) = means_and_moments(bench, nodes), means_and_moments(bench, increment)
-    share = 0.25 * TIME_STEP * bench.simulation._limits.sound_speed / bench.simulation.grid.spacing
+    speed = bench.simulation._limits.sound_speed + bench.simulation.scenario.flow.speed
+    share = 0.25 * TIME_STEP * speed / bench.simulation.grid.spacing
     kept = bench.velocity + gain
     np.testing.assert_allclose(velocity[:, :2], (kept + share * (mean - kept))[:, :2], atol=1e-12)
     expected = bench.affine + gain_slope

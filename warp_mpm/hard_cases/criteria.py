@@ -126,8 +126,8 @@ CRITERIA = (
     ),
     Criterion(
         "unconverged_share",
-        1e-3,
-        1e-3,
+        5e-3,
+        5e-3,
         "share of steps in which the last of a hundred sweeps still changed the barrier's velocity by more than a "
         "thousandth of itself and of what its weight could give it in the step",
     ),
