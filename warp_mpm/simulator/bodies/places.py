@@ -168,7 +168,7 @@ def _points(
         elif end >= ENDLESS:
             s = start + (np.arange(math.ceil(reach / step)) + 0.5) * step
         else:
-            count = math.ceil((end - start) / step - 1e-9)
+            count = max(1, math.ceil((end - start) / step - 1e-9))
             s = start + (np.arange(count) + 0.5) * ((end - start) / count)
         at = pieces.begin[k] + s[:, None] * pieces.along[k]
         near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
