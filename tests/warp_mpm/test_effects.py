@@ -267,8 +267,10 @@ def test_endless_drag_is_undrained(load_scene):
     one = load_scene("case_1_undrained", **heavy)
     two = load_scene("case_1", **heavy | {"flow.material.hydraulic_conductivity_m_per_s": 1e-15})
     ratio = step_limits(one).sound_speed / step_limits(two).sound_speed
-    names = ("bulk_viscosity", "pressure_relaxation", "transfer_damping")
+    names = ("bulk_viscosity", "pressure_relaxation")
     scaled = {f"numerics.{name}": getattr(one.numerics, name) * ratio for name in names}
+    sound = [step_limits(scenario).sound_speed + one.flow.speed for scenario in (one, two)]
+    scaled["numerics.transfer_damping"] = one.numerics.transfer_damping * sound[0] / sound[1]
     runs = []
     for scenario in (one, two.replaced(scaled)):
         simulation, forces, step = Simulation(scenario), [], 1e-3
