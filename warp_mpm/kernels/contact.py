@@ -29,12 +29,14 @@ MOST = 100
 the flow."""
 
 REACHED = 0.75
-"""Share of a place's weights that must lie on nodes with mass before the flow counts as there. Between 0.6 and 0.9
-nothing changes: what decides is whether it is more than the half of a flow that has not come to the surface."""
+"""Share of a place's weights that must lie on nodes with mass before the flow counts as there: more than the half that
+lies on the nodes before the surface, which a flow has that is still to come. From 0.6 to 0.9 case 1 at 0.2 m slides as
+far, to 0.1 %."""
 
 
 def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any, module: str) -> SimpleNamespace:
-    """Build the kernels `press` (over groups of places that stand alone) and `join` (one thread, over all others)."""
+    """Build the kernels `press` (over groups of places that stand alone) and `join` (one block of threads, over all
+    others)."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2

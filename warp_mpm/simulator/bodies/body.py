@@ -94,8 +94,8 @@ class Body:
     carries_grid: bool = False
     """The grid moves with the body along x, so that both stay as they lie to each other; at most one body's."""
     edge: bool = False
-    """An edge of the domain: straight along the grid, acts at the line of cell corners nearest to it, and sets no point
-    back. Its forces are in the balance of momentum but not recorded."""
+    """An edge of the domain: straight along the grid, and sets no point back. Its forces are in the balance of momentum
+    but not recorded."""
 
     def __post_init__(self) -> None:
         if not self.surfaces:

@@ -119,22 +119,6 @@ class Segments:
         return Segments(begin, self.along, low, np.where(self.high < ENDLESS, length, self.high), self.normal, offset,
                         self.closed)  # fmt: skip
 
-    def crest(self) -> Array:
-        """Height [G] at which a piece that is not level ends at a top, that is where the outline goes on level or down
-        on the other side; ENDLESS elsewhere."""
-        found = np.full(len(self), ENDLESS)
-        for k in range(len(self)):
-            nx = self.normal[k, 0]
-            if nx == 0.0:
-                continue
-            # Out of the solid to the left: the piece climbs along the walk.
-            after = k + 1 if nx < 0.0 else k - 1
-            if self.closed:
-                after %= len(self)
-            if 0 <= after < len(self) and self.normal[after, 0] * nx <= 0.0 and self.normal[after, 1] >= 0.0:
-                found[k] = (self.begin[after] if nx < 0.0 else self.begin[k])[1]
-        return found
-
     def box(self, left: float, right: float, bottom: float, top: float) -> Array | None:
         """Smallest box [4] (x from, x to, y from, y to) around the outline's part inside a window; None if outside."""
         found = []
