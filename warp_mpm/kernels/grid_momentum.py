@@ -82,6 +82,6 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             coefficient = grid.drag[i, j] / mass
                         new = dragged(new, coefficient, parameters, time_step)
                     grid.velocity[i, j] = new
-                    keep(grid, i, j, old, new)
+                    keep(grid, i, j, old, new, time_step, parameters)
 
     return SimpleNamespace(move=move)

@@ -8,7 +8,7 @@ from pydantic import Field
 from warp_mpm.schema import Model
 
 from .apic import Apic, affine_field
-from .flip import Flip, make_gained
+from .flip import Flip, make_kept
 from .scheme import Array
 
 
@@ -49,7 +49,7 @@ class Aflip(Flip):
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
         TWO_PHASE = types.effects.two_phase
-        gained = make_gained(types)
+        kept, gained = make_kept(types)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -112,22 +112,22 @@ class Aflip(Flip):
             gain_y = wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean - (wy[2] - wy[0]) * increment
 
             per_moment = F(4.0) * parameters.inverse_spacing
-            kept = F(1.0) - wp.min(parameters.pic_rate * time_step, F(1.0))
-            x = per_moment * lean_x + kept * (read(points.affine_x, p) + per_moment * (gain_x - lean_x))
-            y = per_moment * lean_y + kept * (read(points.affine_y, p) + per_moment * (gain_y - lean_y))
+            share = kept(time_step, parameters)
+            x = share * read(points.affine_x, p) + per_moment * gain_x
+            y = share * read(points.affine_y, p) + per_moment * gain_y
             solid = turning(x[0], y[0], x[1], y[1], time_step)
             if TWO_PHASE:
                 liquid = turning(x[2], y[2], x[3], y[3], time_step)
-                share = V(solid[0], solid[0], liquid[0], liquid[0])
-                x = wp.cw_mul(share, x) + V(solid[1], F(0.0), liquid[1], F(0.0))
-                y = wp.cw_mul(share, y) + V(F(0.0), solid[1], F(0.0), liquid[1])
+                both = V(solid[0], solid[0], liquid[0], liquid[0])
+                x = wp.cw_mul(both, x) + V(solid[1], F(0.0), liquid[1], F(0.0))
+                y = wp.cw_mul(both, y) + V(F(0.0), solid[1], F(0.0), liquid[1])
             else:
                 x = solid[0] * x + V(solid[1], F(0.0))
                 y = solid[0] * y + V(F(0.0), solid[1])
             write(points.affine_x, p, x)
             write(points.affine_y, p, y)
 
-            new = gained(read(points.velocity, p), increment, smooth, time_step, parameters)
+            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
             write(points.velocity, p, new)
             write(points.advection, p, V2(smooth[0], smooth[1]))
             return new

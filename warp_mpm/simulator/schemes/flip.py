@@ -16,34 +16,36 @@ class Settings(Model):
     """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
 
 
-def make_gained(types: SimpleNamespace) -> Any:
-    """Build the function `gained`, the velocity of a point that takes part in what the nodes gained."""
+def make_kept(types: SimpleNamespace) -> tuple[Any, Any]:
+    """Build `kept(time_step, parameters)`, the share of its own velocity that a point keeps in a step, and `gained`,
+    its velocity afterwards."""
     import warp as wp
 
     F, V2, V, Parameters = types.scalar, types.V2, types.V, types.Parameters
     TWO_PHASE = types.effects.two_phase
 
     @wp.func
-    def gained(old: V, increment: V, smooth: V, time_step: F, parameters: Parameters) -> V:
-        """`increment` and `smooth` are what the nodes gained and their velocity, both at the point."""
-        pic = wp.min(parameters.pic_rate * time_step, F(1.0))
-        new = old + increment + pic * (smooth - old - increment)
+    def kept(time_step: F, parameters: Parameters) -> F:
+        return F(1.0) - wp.min(parameters.pic_rate * time_step, F(1.0))
+
+    @wp.func
+    def gained(old: V, increment: V, smooth: V, share: F, time_step: F, parameters: Parameters) -> V:
+        """`increment` and `smooth` are the nodes' own, both at the point; `share` is what the point keeps."""
+        own = share * old
+        new = own + increment
         if TWO_PHASE:
             # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
             decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
-            unseen = V2(
-                old[2] - old[0] - smooth[2] + increment[2] + smooth[0] - increment[0],
-                old[3] - old[1] - smooth[3] + increment[3] + smooth[1] - increment[1],
-            )
+            unseen = own + increment - smooth
             new = V(
                 new[0],
                 new[1],
-                new[0] + smooth[2] - smooth[0] + decay * unseen[0],
-                new[1] + smooth[3] - smooth[1] + decay * unseen[1],
+                new[0] + smooth[2] - smooth[0] + decay * (unseen[2] - unseen[0]),
+                new[1] + smooth[3] - smooth[1] + decay * (unseen[3] - unseen[1]),
             )
         return new
 
-    return gained
+    return kept, gained
 
 
 class Flip(Scheme):
@@ -65,7 +67,7 @@ class Flip(Scheme):
         F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add = tools.read, tools.write, tools.add
-        gained = make_gained(types)
+        kept, gained = make_kept(types)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -99,8 +101,10 @@ class Flip(Scheme):
             )
 
         @wp.func
-        def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V):
-            grid.increment[i, j] = new - old
+        def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V, time_step: F, parameters: Parameters):
+            # So that the points need not read the nodes' velocity too: v + dv + s (v_g - v - dv) is
+            # (1 - s) v + (v_g - (1 - s) (v_g - dv)).
+            grid.increment[i, j] = new - kept(time_step, parameters) * old
 
         @wp.func
         def receive(grid: Grid, i: wp.int32, j: wp.int32, change: V):
@@ -124,7 +128,8 @@ class Flip(Scheme):
             for k in range(3):
                 for m in range(3):
                     increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
-            new = gained(read(points.velocity, p), increment, smooth, time_step, parameters)
+            share = kept(time_step, parameters)
+            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
             write(points.velocity, p, new)
             write(points.advection, p, V2(smooth[0], smooth[1]))
             return new

@@ -81,7 +81,7 @@ class Scheme:
         - `clear(grid, i, j)`: empties the scheme's own fields at a node (default: it has none);
         - `free_velocity(grid, i, j, inverse: V, gravity: V, time_step) -> V`: velocity at the end of the step without
           drag and contact, `inverse` being 1 over each phase's mass (default: the momentum has it all);
-        - `keep(grid, i, j, old: V, new: V)`: velocities before and after (default: forgotten);
+        - `keep(grid, i, j, old: V, new: V, time_step, parameters)`: velocities before and after (default: forgotten);
         - `receive(grid, i, j, change: V)`: what contact changes (default: nothing beside the velocity);
         - `displacement(points, p, grid, x, shift, time_step, parameters) -> V2`: of a point in the step (default: with
           the solid's velocity).
@@ -114,7 +114,7 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
         return wp.cw_mul(inverse, grid.velocity[i, j])
 
     @wp.func
-    def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V):
+    def keep(grid: Grid, i: wp.int32, j: wp.int32, old: V, new: V, time_step: F, parameters: Parameters):
         pass
 
     @wp.func
