@@ -13,8 +13,9 @@ from .simulator.schemes import SCHEMES, Scheme
 
 ONE_TIME = 1e-3
 """Share of a nominal step by which two times may differ and be one: no step is made from one to the other. Times that
-are meant to be equal differ by their rounding; the impulse of a contact does not vanish with the step, so that a mean
-force over less would be of any size."""
+are meant to be equal differ by their rounding. What a contact gives in a step goes to nothing with the step, but the
+first short steps after longer ones also hold what those left over, together up to half of what one of them gave: a mean
+force over a sliver would be of any size."""
 
 SHORTEST_RECORD = 0.1
 """Least share of a nominal step that a record of a run covers: records that lie closer are made at one time."""

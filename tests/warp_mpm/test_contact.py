@@ -28,7 +28,7 @@ def momentum(simulation):
 def test_reactions_are_the_momentum_change(load_scene, name):
     """Forces, means over each interval, are what the flow lost beyond gravity's share: Eq. (A14), both directions.
 
-    Case 5 has an upright face, which acts on mirrored pairs of nodes; the others' inclined faces act on single ones.
+    Case 5 has an upright face, which acts on mirrored pairs of nodes; the others' inclined faces act at points of theirs.
     """
     simulation = Simulation(scene(load_scene, name))
     points = simulation.points()
@@ -178,3 +178,23 @@ def test_a_wall_without_ground_goes_on_below(load_scene, tilt):
     assert measured.figures["energy_error"] < 1e-3
     assert measured.last.position[:, 1].min() < -5.0
     assert measured.figures["peak_force_filtered"] > 1e5
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_5"])
+def test_what_contact_gives_goes_to_nothing_with_the_step(load_scene, name):
+    """Steps a hundred times shorter give a hundredth each, once what the long ones left over is gone: less than half of
+    what one of those gave, nearly all of it in ten short ones. At inclined faces and upright ones."""
+    simulation = Simulation(scene(load_scene, name))
+    simulation.advance(0.78)
+    simulation.sample()
+    before = simulation.steps
+    simulation.advance(0.8)
+    force, step = simulation.sample()["impact_force_x"], 0.02 / (simulation.steps - before)
+    short = 0.01 * step
+    given = []
+    for count in range(1, 41):
+        simulation.advance(0.8 + count * short)
+        given.append(simulation.sample()["impact_force_x"] * short)
+    # The flow itself changes little meanwhile: all forty cover less than half a long step.
+    assert np.sum(given[:10]) < 0.5 * force * step
+    assert np.sum(given[20:]) == pytest.approx(20 * force * short, rel=0.25)
