@@ -28,7 +28,7 @@ def momentum(simulation):
 def test_reactions_are_the_momentum_change(load_scene, name):
     """Forces, means over each interval, are what the flow lost beyond gravity's share: Eq. (A14), both directions.
 
-    Case 5 has an upright face, which acts on mirrored pairs of nodes; the others' inclined faces act at points of theirs.
+    Case 5 has an upright face, which acts on mirrored pairs of nodes; the others' inclined faces at points of theirs.
     """
     simulation = Simulation(scene(load_scene, name))
     points = simulation.points()

@@ -21,7 +21,7 @@ def make_kept(types: SimpleNamespace) -> tuple[Any, Any]:
     its velocity afterwards."""
     import warp as wp
 
-    F, V2, V, Parameters = types.scalar, types.V2, types.V, types.Parameters
+    F, V, Parameters = types.scalar, types.V, types.Parameters
     TWO_PHASE = types.effects.two_phase
 
     @wp.func
