@@ -57,6 +57,8 @@ SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(FIGURES, _NUMBER),
     **dict.fromkeys(("peak_force_filtered_time", "barrier_velocity_max_time"), _NUMBER),
     **dict.fromkeys(("pore_pressure_max_time", "pore_pressure_max_anywhere_time"), _NUMBER),
+    **dict.fromkeys(("pressure_patch_max_time", "pore_pressure_patch_max_time"), _NUMBER),
+    **dict.fromkeys(("toe_moment_filtered_time", "heel_moment_filtered_time", "run_up_max_time"), _NUMBER),
     **dict.fromkeys(("end_time", "material_points", "steps", "time_step_min", "time_step_max"), _NUMBER),
     **dict.fromkeys(("initial_volume", "left_volume"), _NUMBER),
     **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
