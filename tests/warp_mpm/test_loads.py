@@ -1,13 +1,21 @@
 """Where the flow acts on the barrier: exact at rest, in sum what the reactions are; pressures that mean something."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from warp_mpm.cli import app
 from warp_mpm.kernels import layout as at
-from warp_mpm.recording import TimeSeriesRecorder
-from warp_mpm.run import run_in_memory
+from warp_mpm.plotting import loads_by_height
+from warp_mpm.plotting.loads import patches
+from warp_mpm.recording import LoadsRecorder, TimeSeriesRecorder
+from warp_mpm.report import write_report
+from warp_mpm.results import Results, ResultsError, read_loads
+from warp_mpm.run import resume_run, run_in_memory, run_scenario
+from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
 from warp_mpm.simulator.bodies.loads import slots_of
 from warp_mpm.state.loads import LoadsNow
@@ -246,3 +254,130 @@ def test_the_headline_has_the_patch_and_not_the_cell():
     assert rows["greatest pressure on the face"] == "400.0 kPa at 0.200 s, 0.25 m up"
     assert rows["  as a mean over"] == "0.5 m and 0.02 s"
     assert not any("in a cell" in name for name in rows)
+
+
+# -- by height and time ------------------------------------------------------------------------------------------
+
+
+def asking(load_scene, name="case_1", **changes):
+    coarse = {"numerics.spacing_m": 0.6, "output.end_time_s": 0.8, "output.loads_by_height": True}
+    return load_scene(name, **coarse | changes)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory, load_scene):
+    """A coarse run of case 1 that records loads by height."""
+    folder = tmp_path_factory.mktemp("loads") / "run"
+    run_scenario(asking(load_scene), folder, make_simulation=Simulation)
+    return Results.open(folder)
+
+
+def test_loads_by_height_integrate_to_the_recorded_forces(recorded):
+    loads, series = recorded.loads, recorded.time_series
+    np.testing.assert_array_equal(loads.times, series["time"])
+    columns = {"impact": ("impact_force_x", "impact_force_y"), "top": ("top_force", "top_force_y"),
+               "back": ("back_force_x", "back_force_y")}  # fmt: skip
+    assert set(loads.surfaces) == set(columns)
+    for name, (along_x, along_y) in columns.items():
+        surface = loads.surfaces[name]
+        length = np.diff(surface.edges)
+        x, y = np.diff(surface.place) / length, np.diff(surface.height) / length  # along the surface
+        normal, shear = surface.pressures["normal"] * length, surface.pressures["shear"] * length
+        # The solid lies on the right of the surface: pressure acts that way.
+        for column, force in ((along_x, normal * y + shear * x), (along_y, -normal * x + shear * y)):
+            scale = max(1.0, float(np.abs(normal).sum(axis=1).max()))
+            np.testing.assert_allclose(force.sum(axis=1), series[column], rtol=0.0, atol=1e-11 * scale)
+        assert (surface.pressures["liquid"] <= surface.pressures["normal"]).all()
+    face = loads.surfaces["impact"]
+    assert face.pressures["pore_pressure"] == pytest.approx(face.pressures["liquid"] / 0.5)
+    assert face.height[[0, -1]] == pytest.approx([0.0, 6.0])
+    assert np.diff(face.edges) == pytest.approx(np.diff(face.edges)[0])
+    assert series["impact_force_x"].max() > 1e5
+
+
+def test_who_does_not_ask_has_no_loads_and_the_same_run(recorded, load_scene, tmp_path):
+    run_scenario(asking(load_scene, **{"output.loads_by_height": False}), tmp_path / "run", make_simulation=Simulation)
+    plain = Results.open(tmp_path / "run")
+    assert (plain.path / "timeseries.csv").read_bytes() == (recorded.path / "timeseries.csv").read_bytes()
+    assert not (plain.path / "loads.h5").exists()
+    with pytest.raises(ResultsError, match=r"loads.h5 is missing: output.loads_by_height = true records it"):
+        _ = plain.loads
+
+
+def test_an_undrained_flow_tells_its_pore_pressure_where_there_is_friction(load_scene, tmp_path):
+    changes = {"output.end_time_s": 0.3, "output.quantities": ["impact_force_x"]}
+    for friction, told in (({"face": 0.3, "top": 0.0, "back": 0.0}, True), (0.0, False)):
+        scenario = asking(load_scene, "case_1_undrained", **changes | {"barrier.friction": friction})
+        run_scenario(scenario, tmp_path / f"{told}", make_simulation=Simulation)
+        surfaces = Results.open(tmp_path / f"{told}").loads.surfaces
+        assert ("pore_pressure" in surfaces["impact"].pressures) == told
+        assert "pore_pressure" not in surfaces["top"].pressures
+        assert "liquid" not in surfaces["impact"].pressures
+
+
+def test_loads_that_were_interrupted_go_on(recorded, load_scene, tmp_path):
+    """Stopped between two checkpoints: what was written after the last one is written again, once."""
+    scenario = asking(load_scene, **{"output.checkpoint_interval_s": 0.1})
+    seen = []
+    run_scenario(
+        scenario,
+        tmp_path / "run",
+        make_simulation=Simulation,
+        on_progress=lambda progress: seen.append(progress.time),
+        stop=lambda: bool(seen) and seen[-1] > 0.57,
+    )
+    stopped = Results.open(tmp_path / "run").loads
+    assert 0.57 < stopped.times[-1] < 0.6
+    assert resume_run(tmp_path / "run", make_simulation=Simulation).finished
+    ours, whole = Results.open(tmp_path / "run").loads, recorded.loads
+    np.testing.assert_array_equal(ours.times, whole.times)
+    for name, surface in whole.surfaces.items():
+        for kind, values in surface.pressures.items():
+            np.testing.assert_array_equal(ours.surfaces[name].pressures[kind], values)
+
+
+def test_loads_of_a_process_that_died_are_read(load_scene, tmp_path):
+    """Nobody closes the file: its room is laid down, and the rows before the last are whole."""
+    recorder = LoadsRecorder(tmp_path / "loads.h5", 0.1, 10.0)
+    simulation = Simulation(asking(load_scene))
+    for step in range(3):
+        simulation.advance(0.1 * step)
+        recorder.record(simulation)
+    shutil.copy(tmp_path / "loads.h5", tmp_path / "copy.h5")
+    loads = read_loads(tmp_path / "copy.h5")
+    assert loads.times == pytest.approx([0.0, 0.1, 0.2])
+    assert loads.surfaces["impact"].pressures["normal"].shape == (3, len(loads.surfaces["impact"].edges) - 1)
+    recorder.close()
+    (tmp_path / "copy.h5").write_bytes((tmp_path / "loads.h5").read_bytes()[:1000])
+    with pytest.raises(ResultsError, match="cannot be read as HDF5"):
+        read_loads(tmp_path / "copy.h5")
+
+
+def test_loads_by_height_are_drawn(recorded, tmp_path):
+    answer = CliRunner().invoke(app, ["plot", "loads", str(recorded.path), "--out", str(tmp_path / "loads.png")])
+    assert answer.exit_code == 0, answer.output
+    over_time, envelope, _ = loads_by_height(recorded).axes
+    mesh = over_time.collections[0].get_array()
+    face = recorded.loads.surfaces["impact"]
+    assert mesh.shape == (len(face.edges) - 1, len(recorded.loads.times) - 1)
+    assert float(mesh.max()) * 1e3 <= face.pressures["normal"].max()
+    shares = patches(face.edges, 1.3)
+    assert shares.sum(axis=0) == pytest.approx(1.0)
+    assert shares[2, 2] == pytest.approx(np.diff(face.edges)[0] / 1.3)
+    assert [text.get_text() for text in envelope.get_legend().get_texts()] == [
+        "both phases",
+        "pore pressure",
+        "height of the peak force",
+    ]
+    write_report([recorded], tmp_path / "report.html")
+    assert "height of the resultant" in (tmp_path / "report.html").read_text()
+
+
+def test_loads_by_height_need_a_barrier_and_room(load_scene):
+    with pytest.raises(ScenarioError, match=r"output.loads_by_height = true needs a barrier"):
+        asking(load_scene, barrier=None)
+    with pytest.raises(ScenarioError, match=r"output.time_series_interval_s = 1e-06 asks for about [0-9.e+]+ GB"):
+        asking(
+            load_scene,
+            **{"numerics.spacing_m": 0.005, "output.time_series_interval_s": 1e-6, "output.end_time_s": 9.0},
+        )

@@ -112,6 +112,8 @@ class Output(Model):
     """Length of the patch of the impacted face over which pressure_patch_max is a mean; of a shorter face all of it."""
     pressure_patch_s: Interval = 0.02
     """Time over which it is one too."""
+    loads_by_height: bool = False
+    """Record pressure and friction along the barrier's surfaces at each time of the series, in loads.h5."""
     checkpoint_interval_s: Interval | None = None
     """Simulated time between checkpoints, from which an interrupted run goes on; null: one in 30 s of wall time."""
 
