@@ -65,7 +65,7 @@ SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("initial_volume", "left_volume"), _NUMBER),
     **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
-    **dict.fromkeys(("definitions", "mechanism_measures"), (dict, NoneType)),
+    **dict.fromkeys(("definitions", "mechanism_measures", "verdict"), (dict, NoneType)),
     "notes": (list,),
 }
 """The same of its summary; figures of quantities that a script records are numbers too."""

@@ -18,6 +18,7 @@ from analytic.force_record import (
     still_rises,
 )
 from warp_mpm import mechanism
+from warp_mpm.design_checks import verdict
 from warp_mpm.quantities import left_out
 from warp_mpm.quantities.figures import FIGURES, NEEDED
 from warp_mpm.quantities.time_series import NAMED
@@ -30,6 +31,7 @@ Series = Mapping[str, Array]
 
 DEFINITIONS = {name: figure.meaning for name, figure in FIGURES.items()} | {
     "mechanism": mechanism.RULE,
+    "verdict": "what the run says to the scenario's design group; null without one (docs/how_to/design_checks.md)",
     "notes": "what must be known before the scene and its figures are trusted",
 }
 """How each figure is taken."""
@@ -79,6 +81,7 @@ def summarize(
         if name not in NAMED:  # of a script, or on a script's body: `quantities.SUMMED_UP`
             (figures[f"{name}_max"], figures[f"{name}_max_time"]), values = _peak(series, name), series[name]
             figures[f"{name}_final"] = float(values[-1])
+    figures["verdict"] = verdict(scenario, series, figures)
     unknown = not_recorded(scenario)
     errors: dict[str, Callable[[], float | None]] = {
         "mass_error": lambda: mass_error(series),

@@ -18,6 +18,7 @@ from rich.text import Text
 from analytic.command_line import other_ends
 from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.description import described
+from warp_mpm.design_checks import verdict_rows
 from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
@@ -185,7 +186,8 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         (words("wall_time"), told("wall_time")),
     ]
-    return [(name, value) for name, value in rows if value is not None]
+    judged = verdict_rows(summary["verdict"]) if summary.get("verdict") else []
+    return [*((name, value) for name, value in rows if value is not None), *judged]
 
 
 def displacement(summary: Mapping[str, Any]) -> str | None:

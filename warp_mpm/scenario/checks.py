@@ -135,6 +135,8 @@ def _excessive_size(scenario: Scenario) -> list[str]:
             f"{snapshots / 1e9:.3g} GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
         )
     output = scenario.output
+    if scenario.design is not None and scenario.barrier is None:
+        problems.append("design needs a barrier")
     if output.loads_by_height and scenario.barrier is None:
         problems.append("output.loads_by_height = true needs a barrier")
     elif output.loads_by_height:
