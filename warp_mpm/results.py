@@ -11,6 +11,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +28,7 @@ from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.points import POINT_FIELDS, POSITION
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.recording import run_folder
+from warp_mpm.recording.loads import MEANINGS
 from warp_mpm.recording.time_series import column_named
 from warp_mpm.scenario import Scenario
 from warp_mpm.snapshot import Snapshot
@@ -57,11 +59,13 @@ SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(FIGURES, _NUMBER),
     **dict.fromkeys(("peak_force_filtered_time", "barrier_velocity_max_time"), _NUMBER),
     **dict.fromkeys(("pore_pressure_max_time", "pore_pressure_max_anywhere_time"), _NUMBER),
+    **dict.fromkeys(("pressure_patch_max_time", "pore_pressure_patch_max_time"), _NUMBER),
+    **dict.fromkeys(("toe_moment_filtered_time", "heel_moment_filtered_time", "run_up_max_time"), _NUMBER),
     **dict.fromkeys(("end_time", "material_points", "steps", "time_step_min", "time_step_max"), _NUMBER),
     **dict.fromkeys(("initial_volume", "left_volume"), _NUMBER),
     **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
-    **dict.fromkeys(("definitions", "mechanism_measures"), (dict, NoneType)),
+    **dict.fromkeys(("definitions", "mechanism_measures", "verdict"), (dict, NoneType)),
     "notes": (list,),
 }
 """The same of its summary; figures of quantities that a script records are numbers too."""
@@ -162,6 +166,61 @@ class Snapshots:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+@dataclass(frozen=True)
+class SurfaceLoads:
+    """What acted on a surface of the barrier, in n slots, at T times; pressures are means over the interval."""
+
+    edges: Array
+    """[n + 1] of the slots, along the surface [m]."""
+    place: Array
+    """[n + 1] the same downstream of the toe, before the barrier moves [m]."""
+    height: Array
+    """[n + 1] the same above the base [m]."""
+    pressures: Mapping[str, Array]
+    """[T, n] each in Pa: `normal` of both phases, `liquid` what of it the liquid phase bears, `shear` along the surface
+    toward its next slot, `pore_pressure`; those that the scene tells."""
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Loads on the barrier by height and time."""
+
+    times: Array
+    """[T] ends of the intervals [s]."""
+    surfaces: Mapping[str, SurfaceLoads]
+    """`impact`, `top` and `back`, those that the barrier has."""
+
+
+def read_loads(path: str | Path) -> Loads:
+    """Loads by height from a run's `loads.h5`.
+
+    Raises:
+        ResultsError: the file is missing or damaged.
+    """
+    path = Path(path)
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            rows = int(file.attrs["rows"])
+            names = [name for name in ("impact", "top", "back") if name in file]
+            surfaces = {
+                name: SurfaceLoads(
+                    file[name]["edges"][()],
+                    file[name]["place"][()],
+                    file[name]["height"][()],
+                    {kind: file[name][kind][:rows] for kind in MEANINGS if kind in file[name]},
+                )
+                for name in names
+            }
+            return Loads(file["time"][:rows], surfaces)
+    except FileNotFoundError:
+        raise ResultsError(f"{path} is missing: output.loads_by_height = true records it.") from None
+    except OSError as error:
+        reason = f"read: {os.strerror(error.errno)}" if error.errno is not None else f"read as HDF5: {error}"
+        raise ResultsError(f"{path} cannot be {reason}.") from None
+    except (KeyError, ValueError) as error:
+        raise ResultsError(f"{path} does not hold the loads of a run: {error}.") from None
 
 
 class Results:
@@ -325,6 +384,15 @@ class Results:
             "component": ["xx", "yy", "zz", "xy"],
         }
         return xr.Dataset(variables, coordinates, {"title": self.scenario.title})
+
+    @cached_property
+    def loads(self) -> Loads:
+        """Loads on the barrier by height and time, of a run with `output.loads_by_height`.
+
+        Raises:
+            ResultsError: the file is missing or damaged.
+        """
+        return read_loads(self.path / run_folder.LOADS)
 
     @cached_property
     def snapshots(self) -> Snapshots:

@@ -22,6 +22,7 @@ from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
 from warp_mpm.recording import (
     Checkpointer,
+    LoadsRecorder,
     Recorder,
     RunFolder,
     Schedule,
@@ -212,7 +213,7 @@ def resume_run(
         simulation.prepare()
         preparation_time = time.perf_counter() - preparing
         if checkpoint is None:
-            for name in (run_folder.TIME_SERIES, run_folder.SNAPSHOTS):
+            for name in (run_folder.TIME_SERIES, run_folder.SNAPSHOTS, run_folder.LOADS):
                 (out / name).unlink(missing_ok=True)
         else:
             try:
@@ -245,11 +246,16 @@ def _go_on(
     wall_before = checkpoint.wall_time if checkpoint is not None else 0.0
     marks: dict[str, Any] = checkpoint.marks if checkpoint is not None else {}
     started = time.perf_counter()
-    # The structure of the snapshots can be damaged in more ways than a text: it is opened before that is cut.
-    snapshots = SnapshotRecorder(
-        out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time, mark=marks.get("snapshots")
-    )
+    # The structure of HDF5 can be damaged in more ways than a text: it is opened before that is cut.
+    structured: dict[str, Any] = {}
     try:
+        structured["snapshots"] = SnapshotRecorder(
+            out / run_folder.SNAPSHOTS, output.snapshot_interval_s, end_time, mark=marks.get("snapshots")
+        )
+        if output.loads_by_height:
+            structured["loads"] = LoadsRecorder(
+                out / run_folder.LOADS, output.time_series_interval_s, end_time, mark=marks.get("loads")
+            )
         series = TimeSeriesRecorder(
             out / run_folder.TIME_SERIES,
             output.time_series_interval_s,
@@ -257,15 +263,15 @@ def _go_on(
             mark=marks.get("time_series"),
         )
     except RunFolderError:
-        snapshots.close()
+        _close(list(structured.values()))
         raise
-    recorders: list[Recorder] = [series, snapshots, *own]
+    recorders: list[Recorder] = [series, *structured.values(), *own]
     if checkpoint is not None:
         folder.write(run_folder.RECORD, record)
     checkpointer = Checkpointer(
         folder,
         scenario.resolved(),
-        {"time_series": series, "snapshots": snapshots},
+        {"time_series": series, **structured},
         output.checkpoint_interval_s,
         wall_before=wall_before,
     )

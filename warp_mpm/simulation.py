@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from functools import cache, wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -27,11 +28,13 @@ from .quantities.time_series import OWN
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
 from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of
+from .simulator.bodies.loads import slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
 from .state.arrays import clock_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
+from .state.loads import LoadsNow
 from .state.parameters import kernel_parameters
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
@@ -59,6 +62,12 @@ LANES = 256
 
 IMPULSES = ("solid", "liquid", "alone", "rubbed")
 """Arrays of the places of contact that a step leaves to the next."""
+
+INTERVAL = ("begin", "reactions", "turned", "taken")
+"""Parts of the mark of the last interval, as a state keeps them."""
+
+LOADS = ("taken", "turned")
+"""Sums of the barrier's slots and surfaces since t = 0."""
 
 
 def _check_names(bodies: Sequence[Body]) -> None:
@@ -177,6 +186,8 @@ class Simulation:
         self.bodies: tuple[Body, ...] = (*scene_bodies(scenario, self.grid), *bodies)
         """All that the flow meets, in the order in which they act on it."""
         _check_names(self.bodies)
+        self.slots = slots_of(scenario, self.bodies)
+        """The barrier's surfaces, divided; None without a barrier."""
         self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
         _start_warp()
         try:
@@ -241,7 +252,9 @@ class Simulation:
         self._contact, self._contact_arrays = None, {}
         if effects.bodies:
             lanes = 1 if device.is_cpu else LANES
-            contact = contact_arrays(self.bodies, effects, types, self.grid, lanes=lanes, device=device)
+            contact = contact_arrays(
+                self.bodies, effects, types, self.grid, slots=self.slots, lanes=lanes, device=device
+            )
             self._contact, self._contact_arrays = contact.structure, contact.arrays
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
@@ -261,6 +274,7 @@ class Simulation:
         self._seen = {}
         if device.is_cpu:
             self._seen = {name: array.numpy() for name, array in (self._clock_arrays | self._body_arrays).items()}
+            self._seen |= {name: self._contact_arrays[name].numpy() for name in LOADS if name in self._contact_arrays}
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
@@ -449,7 +463,10 @@ class Simulation:
         """Present numbers of clock, bodies, counters or sums; on the CPU they go on changing with the run."""
         if name in self._seen:
             return self._seen[name]
-        return (self._body_arrays if name in self._body_arrays else self._clock_arrays)[name].numpy()
+        for arrays in (self._body_arrays, self._contact_arrays):
+            if name in arrays:
+                return arrays[name].numpy()
+        return self._clock_arrays[name].numpy()
 
     def _fill(self, array: Any, value: float | tuple[float, float]) -> None:
         """Set all of an array on the device; on the CPU behind Warp's back, which may be at work for another thread."""
@@ -582,9 +599,21 @@ class Simulation:
         return {name: stored(name) if name in own else quantities[name]() for name in shown}
 
     def window(self) -> Window:
-        """A mark of the present time, since which `sample` can tell mean forces. It belongs to the caller."""
-        base_impulse = self._barrier_number("base_impulse") if self._barrier is not None else 0.0
-        return Window(self._clock_entry(at.TIME), self._read("reactions").tolist(), base_impulse)
+        """A mark of the present time, since which `sample` can tell mean forces. It belongs to the caller.
+
+        Pressures on a patch are means over `output.pressure_patch_s`: where that is longer than the caller's intervals,
+        `Window.after` keeps what is needed of the marks before.
+        """
+        if self._barrier is None:
+            return Window(self._clock_entry(at.TIME), self._read("reactions").tolist())
+        return Window(
+            self._clock_entry(at.TIME),
+            self._read("reactions").tolist(),
+            self._barrier_number("base_impulse"),
+            self._read("turned").tolist(),
+            self._read("taken").tolist(),
+            reach=self.scenario.output.pressure_patch_s,
+        )
 
     @_one_thread_at_a_time_on_a_gpu
     def sample(self, names: Collection[str] | None = None, *, since: Window | None = None) -> dict[str, float]:
@@ -636,6 +665,7 @@ class Simulation:
                 motion.mass if isinstance(motion, Sliding) else 0.0,
             )
         forces, base_force = mean_forces(self.bodies, now, since)
+        loads = None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, now, since)
         return Now(
             scenario=self.scenario,
             bodies=self.bodies,
@@ -645,6 +675,7 @@ class Simulation:
             elapsed=now.time - since.time,
             forces=forces,
             base_force=base_force,
+            loads=loads,
             impulses=now.reactions,
             initial_momentum=self._initial_momentum,
             points=self.points,
@@ -686,6 +717,8 @@ class Simulation:
             "balance": self._balance,
             "grid.shift": self._grid_arrays["shift"],
         }
+        if self.slots is not None:
+            arrays |= {f"contact.{name}": self._contact_arrays[name] for name in LOADS}
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
         if self.effects.joined:
             # Their impulses begin with those of the step before. Places that stand alone begin with none; how many they
@@ -712,11 +745,14 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        time, base_impulse, *reactions = state["interval"].tolist()
-        self._since = Window(time, reactions, base_impulse)
+        (time, base_impulse), reactions, turned, taken = (state[f"interval.{name}"].tolist() for name in INTERVAL)
+        self._since = replace(self.window(), time=time, base_impulse=base_impulse, reactions=reactions,
+                              turned=turned, taken=taken)  # fmt: skip
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}
         kept: dict[str, Any] = {"initial_momentum": self._initial_momentum, "scene": self._scene_mark}
-        kept["interval"] = [self._since.time, self._since.base_impulse, *self._since.reactions]
+        since = self._since
+        numbers = ([since.time, since.base_impulse], since.reactions, since.turned, since.taken)
+        kept |= {f"interval.{name}": values for name, values in zip(INTERVAL, numbers, strict=True)}
         return state | {name: np.array(values) for name, values in kept.items()}

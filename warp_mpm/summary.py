@@ -18,6 +18,7 @@ from analytic.force_record import (
     still_rises,
 )
 from warp_mpm import mechanism
+from warp_mpm.design_checks import verdict
 from warp_mpm.quantities import left_out
 from warp_mpm.quantities.figures import FIGURES, NEEDED
 from warp_mpm.quantities.time_series import NAMED
@@ -30,6 +31,7 @@ Series = Mapping[str, Array]
 
 DEFINITIONS = {name: figure.meaning for name, figure in FIGURES.items()} | {
     "mechanism": mechanism.RULE,
+    "verdict": "what the run says to the scenario's design group; null without one (docs/how_to/design_checks.md)",
     "notes": "what must be known before the scene and its figures are trusted",
 }
 """How each figure is taken."""
@@ -57,9 +59,15 @@ def summarize(
     for name, column in (
         ("pore_pressure_max", "pore_pressure_max"),
         ("pore_pressure_max_anywhere", "pore_pressure_max_anywhere"),
+        ("run_up_max", "run_up"),
         ("barrier_velocity_max", "barrier_velocity"),
     ):
         figures[name], figures[f"{name}_time"] = _peak(series, column)
+    for name in ("pressure_patch", "pore_pressure_patch"):
+        figures |= _patch(series, name)
+    figures["pressure_patch_m"] = scenario.output.pressure_patch_m
+    figures["pressure_patch_s"] = scenario.output.pressure_patch_s
+    figures |= load_figures(series)
     displacement = series.get("barrier_displacement")
     figures["barrier_displacement_final"] = None if displacement is None else float(displacement[-1])
     velocity = series.get("barrier_velocity")
@@ -73,6 +81,7 @@ def summarize(
         if name not in NAMED:  # of a script, or on a script's body: `quantities.SUMMED_UP`
             (figures[f"{name}_max"], figures[f"{name}_max_time"]), values = _peak(series, name), series[name]
             figures[f"{name}_final"] = float(values[-1])
+    figures["verdict"] = verdict(scenario, series, figures)
     unknown = not_recorded(scenario)
     errors: dict[str, Callable[[], float | None]] = {
         "mass_error": lambda: mass_error(series),
@@ -144,6 +153,23 @@ def impact_figures(time: Array, force: Array | None) -> dict[str, float | None]:
     return figures
 
 
+def load_figures(series: Series) -> dict[str, float | None]:
+    """Height of the peak force and greatest moments, all of moving means; None of what there is not."""
+    time, force, height = series["time"], series.get("impact_force_x"), series.get("impact_force_height")
+    figures: dict[str, float | None] = {"peak_force_height": None}
+    if force is not None and height is not None and len(time) > 1:
+        filtered = moving_mean(time, force)
+        peak = filtered_peak(filtered)
+        if filtered[peak] > 0.0:
+            figures["peak_force_height"] = float(moving_mean(time, force * height)[peak] / filtered[peak])
+    for name in ("toe_moment", "heel_moment"):
+        figures[f"{name}_filtered"] = figures[f"{name}_filtered_time"] = None
+        if name in series:
+            means = {name: moving_mean(time, series[name]), "time": time}
+            figures[f"{name}_filtered"], figures[f"{name}_filtered_time"] = _peak(means, name)
+    return figures
+
+
 def mass_error(series: Series) -> float | None:
     """Greatest relative change of the mass, in the domain and departed together."""
     if "solid_mass" not in series:
@@ -179,6 +205,14 @@ def energy_error(series: Series) -> float | None:
     scale = float(sum(abs(series[part][0]) for part in parts))
     # Unlike max, which takes 0 where it is offered no number.
     return None if scale == 0.0 else float(np.maximum((total - total[0]).max(), 0.0)) / scale
+
+
+def _patch(series: Series, name: str) -> dict[str, float | None]:
+    """Greatest pressure on a patch of the face, its time and its height; None where there was none."""
+    greatest, time = _peak(series, name)
+    pressed, height = bool(greatest), series.get(f"{name}_height")
+    at = None if height is None or not pressed else float(height[int(np.argmax(series[name]))])
+    return {f"{name}_max": greatest, f"{name}_max_time": time if pressed else None, f"{name}_max_height": at}
 
 
 def _peak(series: Series, name: str) -> tuple[float | None, float | None]:

@@ -18,6 +18,7 @@ from rich.text import Text
 from analytic.command_line import other_ends
 from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.description import described
+from warp_mpm.design_checks import verdict_rows
 from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
@@ -142,6 +143,12 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         value = summary.get(name)
         return None if value is None else f"{value:.1e}"
 
+    def patch(name: str) -> str | None:
+        height = summary.get(f"{name}_height")
+        where = "" if height is None else f", {height:.2f} m up"
+        value = told(name, at=f"{name}_time")
+        return None if value is None else value + where
+
     volumes = [
         f"{summary[name]:.1f} {FIGURES[name].short}"
         for name in ("retained_volume", "on_crest_volume", "overtopped_volume")
@@ -151,6 +158,9 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     def words(name: str) -> str:
         return FIGURES[name].words
 
+    # Where there is no face to press on, or the run is an older one's.
+    pressed = summary.get("pressure_patch_max") is not None
+    mean_over = " and ".join(filter(None, (told(f"pressure_patch_{unit}", "g") for unit in "ms")))
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
         (words("peak_force_filtered"), told("peak_force_filtered", at="peak_force_filtered_time")),
@@ -161,11 +171,10 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
             f"{words('rise_time')} {FIGURES['rise_time'].symbol}, duration {FIGURES['impact_duration'].symbol}",
             _times(summary),
         ),
-        (words("pore_pressure_max"), told("pore_pressure_max", at="pore_pressure_max_time")),
-        (
-            "  at a single point, noise and all",
-            told("pore_pressure_max_anywhere", at="pore_pressure_max_anywhere_time"),
-        ),
+        (words("pressure_patch_max"), patch("pressure_patch_max")),
+        ("  as a mean over", mean_over if pressed else None),
+        ("  of the liquid", patch("pore_pressure_patch_max")),
+        (words("pore_pressure_max"), None if pressed else told("pore_pressure_max", at="pore_pressure_max_time")),
         (words("barrier_velocity_max"), told("barrier_velocity_max", ",.2f")),
         (words("barrier_displacement_final"), displacement(summary)),
         (f"volume [{FIGURES['retained_volume'].shown_unit}]", ", ".join(volumes) or None),
@@ -177,7 +186,8 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         (words("wall_time"), told("wall_time")),
     ]
-    return [(name, value) for name, value in rows if value is not None]
+    judged = verdict_rows(summary["verdict"]) if summary.get("verdict") else []
+    return [*((name, value) for name, value in rows if value is not None), *judged]
 
 
 def displacement(summary: Mapping[str, Any]) -> str | None:

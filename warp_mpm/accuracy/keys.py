@@ -34,7 +34,7 @@ RULES = ("warp_mpm.summary", "warp_mpm.mechanism", "warp_mpm.accuracy.measure", 
 _PACKAGES = ("warp_mpm", "analytic")
 _SCHEMA = "warp_mpm.scenario"
 _WORDS = ("title", "source", "notes")
-_OTHER_THAN_THE_SCENE = ("numerics.", "output.")
+_OTHER_THAN_THE_SCENE = ("numerics.", "output.", "design")
 
 
 def run_key(scenario: Scenario) -> str:

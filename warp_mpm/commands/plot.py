@@ -20,6 +20,7 @@ class Kind(StrEnum):
     COMPARISON = "comparison"
     FIELD = "field"
     MECHANISM = "mechanism"
+    LOADS = "loads"
 
 
 SEVERAL = (Kind.COMPARISON, Kind.FIELD, Kind.MECHANISM)
@@ -32,7 +33,7 @@ def plot(
         typer.Argument(
             help="scene: flow and barrier with their measures, also of a scenario file; history: forces, displacement "
             "and energies of a run; comparison: the same of several; field: the flow at several times; mechanism: what "
-            "was seen over Fr and H/h.",
+            "was seen over Fr and H/h; loads: pressure on the face over height and time.",
             show_default=False,
         ),
     ],
@@ -74,6 +75,8 @@ def _figure(kind: Kind, paths: list[Path], times: tuple[float, ...] | None, fiel
     runs = [Results.open(path) for path in paths]
     if kind is Kind.HISTORY:
         return plotting.force_and_displacement(runs[0])
+    if kind is Kind.LOADS:
+        return plotting.loads_by_height(runs[0])
     if kind is Kind.COMPARISON:
         return plotting.comparison(runs)
     if kind is Kind.MECHANISM:

@@ -19,7 +19,15 @@ from typing import Any
 import warp as wp
 
 from .elementary import make_elementary
-from .layout import BARRIER_ITERATIONS, BARRIER_UNCONVERGED, TIME_STEP
+from .layout import (
+    BARRIER_ITERATIONS,
+    BARRIER_UNCONVERGED,
+    SLOT_ALONG,
+    SLOT_LIQUID,
+    SLOT_NORMAL,
+    SLOT_SIZE,
+    TIME_STEP,
+)
 
 SWEEPS = 4
 """Sweeps of a step. Two or forty change the sliding distance of the paper's case 1 by 0.1 %."""
@@ -386,6 +394,28 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
             contact.rubbed[e] = share * contact.rubbed[e]
 
     @wp.func
+    def add(contact: Contact, first: wp.int32, share: wp.float64, e: wp.int32):
+        """A share of the place's impulses, to the sums of a slot."""
+        wp.atomic_add(contact.taken, first + wp.static(SLOT_NORMAL), share * wp.float64(contact.solid[e]))
+        if TWO_PHASE:
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.liquid[e]))
+        elif CARRIED:
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.alone[e]))
+        if FRICTION:
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(contact.rubbed[e]))
+
+    @wp.func
+    def note(contact: Contact, e: wp.int32, slot: wp.int32, surface: wp.int32, force: V2):
+        """Keep where along the barrier the impulse acted, and its moment about the barrier's toe."""
+        foot = contact.foot[e]
+        wp.atomic_add(contact.turned, 2 * surface, foot[1] * wp.float64(force[0]))
+        wp.atomic_add(contact.turned, 2 * surface + 1, foot[0] * wp.float64(force[1]))
+        share = contact.share[e]
+        add(contact, wp.static(SLOT_SIZE) * slot, share, e)
+        if share < wp.float64(1.0):
+            add(contact, wp.static(SLOT_SIZE) * (slot + 1), wp.float64(1.0) - share, e)
+
+    @wp.func
     def finish(
         contact: Contact,
         e: wp.int32,
@@ -400,6 +430,9 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         surface = contact.surface[e]
         wp.atomic_add(reactions, 2 * surface, wp.float64(force[0]))
         wp.atomic_add(reactions, 2 * surface + 1, wp.float64(force[1]))
+        slot = contact.slot[e]
+        if slot >= 0:
+            note(contact, e, slot, surface, force)
 
     @wp.kernel(module=module)
     def press(

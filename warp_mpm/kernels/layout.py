@@ -99,6 +99,15 @@ LEFT_MOMENTUM_Y = 3
 LEFT_ENERGY = 4
 LEFT_SIZE = 5
 
+# Entries of a slot of the barrier (`simulator.bodies.loads`): impulses since t = 0 [N s/m].
+SLOT_NORMAL = 0
+"""Into the barrier: of the solid, of one phase of the mixture."""
+SLOT_LIQUID = 1
+"""Into the barrier: of the liquid with two phases; with one, what the liquid's pressure carries of the first."""
+SLOT_ALONG = 2
+"""Along the surface, toward its next slot."""
+SLOT_SIZE = 3
+
 
 def _structure(name: str, fields: dict[str, Any]) -> Any:
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))

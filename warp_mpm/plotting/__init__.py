@@ -2,6 +2,7 @@
 
 from warp_mpm.plotting.curves import comparison as comparison
 from warp_mpm.plotting.curves import force_and_displacement as force_and_displacement
+from warp_mpm.plotting.loads import loads_by_height as loads_by_height
 from warp_mpm.plotting.mechanism import mechanism_diagram as mechanism_diagram
 from warp_mpm.plotting.points import field_panels as field_panels
 from warp_mpm.plotting.points import pore_pressure as pore_pressure
@@ -17,6 +18,7 @@ __all__ = [
     "comparison",
     "field_panels",
     "force_and_displacement",
+    "loads_by_height",
     "mechanism_diagram",
     "pore_pressure",
     "save",

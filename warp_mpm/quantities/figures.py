@@ -27,6 +27,11 @@ class Figure(Quantity):
 
 FORCE = ("impact_force_x",)
 
+PATCH = (
+    "output.pressure_patch_m of the face and output.pressure_patch_s (0.5 m and 20 ms unless given), or over a cell "
+    "and an interval of the time series where these are greater"
+)
+
 _ROWS = (
     Figure(
         "peak_force", "N/m",
@@ -89,14 +94,65 @@ _ROWS = (
         needs=("barrier_velocity",),
     ),
     Figure(
+        "peak_force_height", "m",
+        "height above the barrier's base at which the horizontal force on the impacted face acts at "
+        "peak_force_filtered_time, of its moving mean",
+        "height of the peak force", "h_F", needs=(*FORCE, "impact_force_height"),
+    ),
+    Figure(
+        "toe_moment_filtered", "N m/m",
+        f"greatest moment of the flow on the barrier about its toe, of the moving mean over {FILTER_WINDOW:g} s",
+        f"greatest moment about the toe, {FILTER_WINDOW:g} s mean", "M_toe", needs=("toe_moment",),
+    ),
+    Figure(
+        "heel_moment_filtered", "N m/m",
+        f"greatest moment of the flow that overturns the barrier about its heel, of the moving mean over "
+        f"{FILTER_WINDOW:g} s; its own weight is not counted; null of a wall, which has no heel",
+        f"greatest moment about the heel, {FILTER_WINDOW:g} s mean", "M_heel", needs=("heel_moment",),
+    ),
+    Figure(
+        "pressure_patch_max", "Pa",
+        f"greatest normal pressure of the flow on the impacted face, of both phases, as a mean over {PATCH}",
+        "greatest pressure on the face", "p_max", needs=("pressure_patch",),
+    ),
+    Figure(
+        "pressure_patch_max_height", "m", "height of the middle of that patch above the barrier's base",
+        "height of the greatest pressure", needs=("pressure_patch", "pressure_patch_height"),
+    ),
+    Figure(
+        "pressure_patch_m", "m", "length of the patch of pressure_patch_max and pore_pressure_patch_max",
+        "length of the patch",
+    ),
+    Figure(
+        "pressure_patch_s", "s", "time over which the pressure on that patch is a mean", "time of the patch's mean",
+    ),
+    Figure(
+        "pore_pressure_patch_max", "Pa",
+        f"greatest pressure of the liquid on the impacted face, as a mean over {PATCH}; null of one phase on a smooth "
+        "face, where it is not told apart",
+        "greatest pore pressure on the face", "p_L", needs=("pore_pressure_patch",),
+    ),
+    Figure(
+        "pore_pressure_patch_max_height", "m", "height of the middle of that patch above the barrier's base",
+        "height of the greatest pore pressure", needs=("pore_pressure_patch", "pore_pressure_patch_height"),
+    ),
+    Figure(
+        "run_up_max", "m",
+        "greatest height above the barrier's base up to which the flow pressed on the impacted face (`run_up`); that "
+        "of the crest where it went over",
+        "run-up on the face", "h_r", needs=("run_up",),
+    ),
+    Figure(
         "pore_pressure_max", "Pa",
-        "greatest pore pressure upstream of the barrier's crest at any sample: at the material points, less their "
-        "noise about the mean over a cell",
-        "greatest pore pressure", needs=("pore_pressure_max",),
+        "greatest pore pressure upstream of the barrier's crest at any sample, meant over a cell alone: at the "
+        "material points, less their noise. It may double with each refinement of the grid and is no load to design "
+        "for",
+        "greatest pore pressure in a cell", needs=("pore_pressure_max",),
     ),
     Figure(
         "pore_pressure_max_anywhere", "Pa",
-        "greatest pore pressure of any single material point, noise and jets included",
+        "greatest pore pressure of any single material point, noise and jets included. It may grow with each "
+        "refinement",
         "greatest pore pressure of a point", needs=("pore_pressure_max_anywhere",),
     ),
     Figure(

@@ -12,6 +12,7 @@ from typing import Any
 SHOWN_UNITS = {
     "N/m": ("kN/m", 1e-3),
     "N s/m": ("kN s/m", 1e-3),
+    "N m/m": ("kN m/m", 1e-3),
     "J/m": ("kJ/m", 1e-3),
     "Pa": ("kPa", 1e-3),
     "m3/m": ("m³/m", 1.0),

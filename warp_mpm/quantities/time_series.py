@@ -39,6 +39,16 @@ def two_phases(scenario: Any) -> bool:
     return scenario.flow.formulation == "two_phase"
 
 
+def ended_barrier(scenario: Any) -> bool:
+    """Scenes whose barrier has a base with two ends."""
+    return barrier(scenario) and scenario.barrier.shape.kind == "trapezoid"
+
+
+def pressed_by_liquid(scenario: Any) -> bool:
+    """Scenes that tell the liquid's pressure on the face: it is found with a phase of its own, or for friction."""
+    return barrier(scenario) and (two_phases(scenario) or (liquid(scenario) and scenario.barrier.friction.face > 0.0))
+
+
 def _force(surface: str, axis: str) -> Reader:
     place = "xy".index(axis)
     return lambda now: now.forces[surface][place]
@@ -127,6 +137,56 @@ _ROWS = (
         "normal force at the base", read=lambda now: now.base_normal_force, there=sliding, of_points=False, mean=True,
     ),
     Sampled(
+        "impact_force_height", "m",
+        "height above the barrier's base at which the horizontal force on the impacted face acts; of the mean over the "
+        "interval; 0 without force",
+        "height of the impact force", "h_F", there=barrier, of_points=False,
+        read=lambda now: now.loads.height_of("impact", now.forces["impact"][0]),
+    ),
+    Sampled(
+        "toe_moment", "N m/m",
+        "moment of the flow on the whole barrier about its toe; mean over the interval; + turns it downstream",
+        "moment about the toe", "M_toe", read=lambda now: now.loads.toe_moment, there=barrier, of_points=False,
+        mean=True,
+    ),
+    Sampled(
+        "heel_moment", "N m/m",
+        "moment of the flow on the whole barrier about its heel; mean over the interval; + overturns it",
+        "moment about the heel", "M_heel", there=ended_barrier, of_points=False, mean=True,
+        read=lambda now: now.loads.heel_moment(sum(now.forces[name][1] for name in ("impact", "top", "back"))),
+    ),
+    Sampled(
+        "pressure_patch", "Pa",
+        "greatest mean of the total normal pressure over output.pressure_patch_m of the impacted face and the last "
+        "output.pressure_patch_s, or the interval where that is longer",
+        "pressure on a patch of the face", "p", read=lambda now: now.loads.pressure_patch.pressure, there=barrier,
+        of_points=False,
+    ),
+    Sampled(
+        "pressure_patch_height", "m", "height of the middle of that patch above the barrier's base; 0 without pressure",
+        "height of the patch of greatest pressure", read=lambda now: now.loads.pressure_patch.height, there=barrier,
+        of_points=False,
+    ),
+    Sampled(
+        "pore_pressure_patch", "Pa",
+        "greatest mean of the liquid's pressure over output.pressure_patch_m of the impacted face and the last "
+        "output.pressure_patch_s, or the interval where that is longer",
+        "pore pressure on a patch of the face", "p_L", read=lambda now: now.loads.pore_pressure_patch.pressure,
+        there=pressed_by_liquid, of_points=False,
+    ),
+    Sampled(
+        "pore_pressure_patch_height", "m",
+        "height above the barrier's base of the middle of the patch of greatest pore pressure; 0 without pressure",
+        "height of the patch of greatest pore pressure", read=lambda now: now.loads.pore_pressure_patch.height,
+        there=pressed_by_liquid, of_points=False,
+    ),
+    Sampled(
+        "run_up", "m",
+        "height above the barrier's base up to which the flow presses on the impacted face with a tenth at least of "
+        "rho g h, h its depth at the start; of the mean over the last output.pressure_patch_s",
+        "run-up on the face", "h_r", read=lambda now: now.loads.run_up, there=barrier, of_points=False,
+    ),
+    Sampled(
         "barrier_velocity", "m/s", "velocity of the barrier along x, v_2", "barrier velocity", "v₂",
         read=lambda now: now.barrier.velocity, there=barrier, of_points=False,
     ),
@@ -169,8 +229,9 @@ _ROWS = (
         # What loads the barrier: upstream of the crest's end and meant over a cell. Where a jet lands behind it, single
         # points meet the ground at water-hammer pressure.
         "pore_pressure_max", "Pa",
-        "greatest pore pressure upstream of the crest, meant over a cell, p_L,max, compression positive",
-        "greatest pore pressure", "p_L,max", read=_sum("pressure_mean"), there=liquid,
+        "greatest pore pressure upstream of the crest, meant over a cell, p_L,max, compression positive; it may grow "
+        "with each refinement of the grid",
+        "greatest pore pressure in a cell", "p_L,max", read=_sum("pressure_mean"), there=liquid,
     ),
     Sampled(
         "pore_pressure_max_anywhere", "Pa",

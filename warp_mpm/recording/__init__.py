@@ -1,6 +1,7 @@
 """Recorders: what a run writes while it goes on. They read the simulation; the simulation knows nothing of them."""
 
 from warp_mpm.recording.checkpoint import Checkpointer, read_checkpoint
+from warp_mpm.recording.loads import LoadsRecorder
 from warp_mpm.recording.memory import SeriesInMemory, SnapshotsInMemory, Watcher
 from warp_mpm.recording.run_folder import RunFolder
 from warp_mpm.recording.schedule import Moments, Recorder, Schedule, record_until
@@ -9,6 +10,7 @@ from warp_mpm.recording.time_series import TimeSeriesRecorder
 
 __all__ = [
     "Checkpointer",
+    "LoadsRecorder",
     "Moments",
     "Recorder",
     "RunFolder",

@@ -46,7 +46,7 @@ class SeriesInMemory:
     def record(self, simulation: Any) -> None:
         """Keep one sample."""
         self.samples.append(simulation.sample(self._quantities, since=self._window))
-        self._window = simulation.window()
+        self._window = simulation.window().after(self._window)
 
     def series(self) -> dict[str, Array]:
         """Columns by name, each [samples] in SI units, as of `Results.time_series`."""

@@ -30,7 +30,8 @@ PRESSURE_PLOT = "pore_pressure.png"
 CHECKPOINT = "checkpoint.bin"
 """There only until the run has ended."""
 REPORT = "report.html"
-"""There only where it was asked for."""
+LOADS = "loads.h5"
+"""Both there only where they were asked for."""
 
 OWN_FILES = (SCENARIO, RECORD, TIME_SERIES, SNAPSHOTS, SURFACES, SUMMARY, FORCE_PLOT, PRESSURE_PLOT)
 """All that a finished run leaves."""
@@ -139,7 +140,7 @@ class RunFolder:
             folder.lock()
             if force:
                 # The record goes last: as long as it is there, the folder is known as a run's.
-                own = (*(name for name in (*OWN_FILES, CHECKPOINT, REPORT) if name != RECORD), RECORD)
+                own = (*(name for name in (*OWN_FILES, CHECKPOINT, REPORT, LOADS) if name != RECORD), RECORD)
                 for name in own:
                     (path / (name + ASIDE)).unlink(missing_ok=True)
                     (path / name).unlink(missing_ok=True)

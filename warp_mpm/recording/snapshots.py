@@ -127,7 +127,7 @@ class SnapshotRecorder:
         Raises:
             OSError: it could not be written; those before are kept.
         """
-        with _failures_of_the_disk():
+        with failures_of_the_disk():
             self._append(simulation)
 
     def _append(self, simulation: Any) -> None:
@@ -173,7 +173,7 @@ class SnapshotRecorder:
         """Give back the room that was not used and close the file."""
         if self._file is None:
             return
-        with _failures_of_the_disk():
+        with failures_of_the_disk():
             try:
                 self._give_back()
             finally:
@@ -265,7 +265,7 @@ class SnapshotRecorder:
 
 
 @contextlib.contextmanager
-def _failures_of_the_disk() -> Iterator[None]:
+def failures_of_the_disk() -> Iterator[None]:
     """HDF5 reports them as errors of any kind, with its whole life in the message."""
     try:
         yield

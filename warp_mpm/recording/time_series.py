@@ -92,7 +92,7 @@ class TimeSeriesRecorder:
     def record(self, simulation: Any) -> None:
         """Append one sample."""
         sample = simulation.sample(self._quantities, since=self._window)
-        self._window = simulation.window()
+        self._window = simulation.window().after(self._window)
         if not self._columns:
             self._columns = [key for key in dict.fromkeys((*TIME_SERIES, *sample)) if key in sample]
             self._file.write(",".join(_quantity(key).heading for key in self._columns) + "\n")

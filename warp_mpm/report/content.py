@@ -36,7 +36,10 @@ CHARTS: dict[str, tuple[str, ...]] = {
     "other energies of the flow, and work": (
         *("flow_gravitational_energy", "flow_elastic_energy", "barrier_work", "base_friction_work"),
     ),
-    "greatest pore pressure upstream of the crest": ("pore_pressure_max",),
+    "greatest pressure on a patch of the face": ("pressure_patch", "pore_pressure_patch"),
+    "height of the impact force": ("impact_force_height",),
+    "overturning moment": ("toe_moment", "heel_moment"),
+    "greatest pore pressure in a cell, which may grow with each refinement": ("pore_pressure_max",),
 }
 """Columns of each chart, of one unit; what a script records besides has a chart of its own."""
 

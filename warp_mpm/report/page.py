@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import io
 import json
@@ -21,7 +22,7 @@ from warp_mpm import plotting
 from warp_mpm.recording.run_folder import finite
 from warp_mpm.report.content import run_content
 from warp_mpm.report.points import packed
-from warp_mpm.results import Results
+from warp_mpm.results import Results, ResultsError
 
 POINT_BUDGET = 10_000_000
 """Most bytes of point data of all runs together before compression, which makes at most 13.4 MB of text."""
@@ -50,6 +51,9 @@ def write_report(runs: Sequence[Results], target: str | Path, *, times: Sequence
             content = run_content(results, name)
             content["points"], blob = packed(results, POINT_BUDGET // len(runs), stills)
         content["scene"] = _svg(plotting.scene(results.scenario))
+        if results.scenario.output.loads_by_height:
+            with contextlib.suppress(ResultsError):  # a run that ended before its second sample has none
+                content["loads"] = _svg(plotting.loads_by_height(results))
         contents.append(content)
         blobs.append(blob)
     title = contents[0]["title"] if len(runs) == 1 else " · ".join(names)

@@ -6,6 +6,7 @@ moves toward +x. All forces, masses and volumes are per metre of width.
 """
 
 from warp_mpm.scenario.barrier import Barrier, Fixed, Prescribed, Sliding, SurfaceFriction, Trapezoid, Wall
+from warp_mpm.scenario.design import Boulder, Design
 from warp_mpm.scenario.flow import (
     DryFlow,
     Flow,
@@ -23,6 +24,8 @@ from warp_mpm.scenario.settings import STANDARD_GRAVITY, Domain, Gravity, Ground
 __all__ = [
     "STANDARD_GRAVITY",
     "Barrier",
+    "Boulder",
+    "Design",
     "Domain",
     "DryFlow",
     "Fixed",

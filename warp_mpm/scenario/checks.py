@@ -134,6 +134,19 @@ def _excessive_size(scenario: Scenario) -> list[str]:
             f"output.snapshot_interval_s = {scenario.output.snapshot_interval_s:g} asks for about "
             f"{snapshots / 1e9:.3g} GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
         )
+    output = scenario.output
+    if scenario.design is not None and scenario.barrier is None:
+        problems.append("design needs a barrier")
+    if output.loads_by_height and scenario.barrier is None:
+        problems.append("output.loads_by_height = true needs a barrier")
+    elif output.loads_by_height:
+        slots = (x_high - x_low + 2.0 * (y_high - y_low)) / scenario.numerics.spacing_m
+        loads = 32.0 * slots * output.end_time_s / output.time_series_interval_s
+        if loads > LARGEST_SNAPSHOTS:
+            problems.append(
+                f"output.loads_by_height = true at output.time_series_interval_s = {output.time_series_interval_s:g} "
+                f"asks for about {loads / 1e9:.3g} GB on the disk; at most {LARGEST_SNAPSHOTS / 1e9:.3g} GB are allowed"
+            )
     for name in ("time_series_interval_s", "snapshot_interval_s"):
         interval = getattr(scenario.output, name)
         if scenario.output.end_time_s / interval > 1e7:

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from warp_mpm.scenario.barrier import Barrier
 from warp_mpm.scenario.checks import problems
+from warp_mpm.scenario.design import Design
 from warp_mpm.scenario.flow import Flow, offer_laws
 from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
 from warp_mpm.scenario_errors import ScenarioError, read_json
@@ -38,6 +39,8 @@ class Scenario(Model):
     domain: Domain = Domain()
     numerics: Numerics = Numerics()
     output: Output
+    design: Design | None = None
+    """Limits and partial factors; null: no verdict."""
 
     @classmethod
     def load(cls, path: str | Path) -> Scenario:

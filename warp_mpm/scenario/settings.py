@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from warp_mpm.quantities.time_series import NAMED
-from warp_mpm.schema import Coordinate, Friction, Interval, Model, NonNegative, set_fields
+from warp_mpm.schema import Coordinate, Friction, Interval, Length, Model, NonNegative, set_fields
 from warp_mpm.simulator.schemes import SCHEMES
 
 STANDARD_GRAVITY = 9.81
@@ -108,6 +108,12 @@ class Output(Model):
     quantities: Annotated[tuple[str, ...], Field(strict=False)] | None = None
     """Names of the quantities in the time series, beside its time; null: all that the scene has. What is left out is
     not computed where computing costs, and figures of the summary that need it are told as not recorded."""
+    pressure_patch_m: Length = 0.5
+    """Length of the patch of the impacted face over which pressure_patch_max is a mean; of a shorter face all of it."""
+    pressure_patch_s: Interval = 0.02
+    """Time over which it is one too."""
+    loads_by_height: bool = False
+    """Record pressure and friction along the barrier's surfaces at each time of the series, in loads.h5."""
     checkpoint_interval_s: Interval | None = None
     """Simulated time between checkpoints, from which an interrupted run goes on; null: one in 30 s of wall time."""
 

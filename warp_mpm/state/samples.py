@@ -6,7 +6,7 @@ What each quantity is and how it is read from here stands in `warp_mpm/quantitie
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..kernels import layout as at
@@ -25,6 +25,10 @@ _LEDGER, _LEFT = _entries("LEDGER_"), _entries("LEFT_")
 _BALANCE = {name.lower(): place for name, place in vars(at).items() if name.startswith(("GRAVITY_", "SEEPAGE_"))}
 
 
+CLOSE = 1.0 / 16.0
+"""Share of a window's reach within which it keeps one mark."""
+
+
 @dataclass(frozen=True)
 class Window:
     """Sums since t = 0 at some time: forces since then are differences to them."""
@@ -35,6 +39,26 @@ class Window:
     """Impulse of the flow on each surface along x and y, one after the other [N s/m]."""
     base_impulse: float = 0.0
     """Of friction at the barrier's base [N s/m]."""
+    turned: Sequence[float] = ()
+    """Sums of F_x y and F_y x on each surface of the barrier, one after the other [N s]; nil on other bodies."""
+    taken: Sequence[float] = ()
+    """Of each slot of the barrier (`simulator.bodies.loads`), as in `layout.SLOT_...` [N s/m]."""
+    trail: Sequence[tuple[float, Sequence[float]]] = ()
+    """Times [s] before this one and what `taken` was then, the latest last."""
+    reach: float = 0.0
+    """How long before this time the trail is to begin [s]."""
+
+    def after(self, before: Window | None) -> Window:
+        """The same mark, which knows what an earlier one tells of the time within its reach."""
+        if before is None or not self.taken:
+            return self
+        trail = list(before.trail)
+        # Close marks add nothing that a mean over the reach would show.
+        if not trail or before.time - trail[-1][0] >= CLOSE * self.reach:
+            trail.append((before.time, before.taken))
+        while len(trail) > 1 and trail[1][0] <= self.time - self.reach:
+            trail.pop(0)
+        return replace(self, trail=trail)
 
 
 @dataclass(frozen=True)
@@ -77,6 +101,8 @@ class Now:
     """Mean force of the flow on each surface along x and y, by its name [N/m]."""
     base_force: float
     """Mean friction at the base of a sliding barrier, against its motion [N/m]."""
+    loads: Any
+    """Where the flow acts on the barrier (`state.loads.LoadsNow`); None without one."""
     impulses: Sequence[float]
     """Of the flow on all surfaces since t = 0, along x and y in turn [N s/m]."""
     initial_momentum: Sequence[float]

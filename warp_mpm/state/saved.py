@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-OF_NO_EFFECT = ("title", "source", "notes", "output")
+OF_NO_EFFECT = ("title", "source", "notes", "output", "design")
 """Parts of a scenario that a state does not depend on."""
 
 

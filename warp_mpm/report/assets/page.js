@@ -71,6 +71,10 @@ function fillTables() {
     box.insertAdjacentHTML("beforeend", run.scene);
     for (const note of run.notes) box.appendChild(Object.assign(document.createElement("p"), {className: "hint", textContent: note}));
   }
+  for (const run of runs) if (run.loads) {
+    by("loads").hidden = false;
+    column(by("loads-of"), run, "loads").insertAdjacentHTML("beforeend", run.loads);
+  }
   tableOfRuns("figure-table", run => run.figures);
   const fits = runs.flatMap(run => run.closed_form.map(fit => [run, fit]));
   if (fits.length) {

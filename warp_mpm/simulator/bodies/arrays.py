@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from warp_mpm.effects import Effects
 from warp_mpm.grid import GridLayout
+from warp_mpm.kernels.layout import SLOT_SIZE
 
 from .body import Body, Driven, Sliding
+from .loads import Slots
 from .outline import ENDLESS
 from .places import Places, by_block, coloured, neighbours, places_of, sharing
 
@@ -140,12 +142,25 @@ def body_arrays(
 
 
 def contact_arrays(
-    bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, lanes: int, device: Any
+    bodies: Sequence[Body],
+    effects: Effects,
+    types: SimpleNamespace,
+    grid: GridLayout,
+    *,
+    slots: Slots | None,
+    lanes: int,
+    device: Any,
 ) -> Group:
     """Where the bodies act, and what they give there in a step.
 
     Args:
+        bodies: all that the flow meets.
+        effects: of the scene.
+        types: of the kernels, from `layout`.
+        grid: on which they act.
+        slots: of the barrier, if there is one.
         lanes: threads that share the joined places; see `places.coloured`.
+        device: of Warp.
     """
     passing = [passes(body, bodies) for body in bodies]
     places = places_of(bodies, grid, passing)
@@ -181,7 +196,12 @@ def contact_arrays(
             name: np.concatenate([own, len(alone) + rank[beside[order]]]).astype(np.int32)
             for name, beside in (("before", before), ("after", after))
         }
+    given["slot"] = np.full(len(places), -1, dtype=np.int32)
+    if slots is not None:
+        given["slot"], given["share"] = slots.shares(places, grid.spacing)
+        given["foot"] = slots.feet(places)
     shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1, "more": 1}
+    shapes |= {"taken": SLOT_SIZE * (len(slots) if slots is not None else 0), "turned": 2 * int(first[-1])}
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 

@@ -1,0 +1,179 @@
+"""Loads on the barrier by height and time, in an HDF5 file: what presses and rubs where, slot by slot.
+
+One group for each surface: `edges` [n + 1] along it from its lower or upstream end, `height` and `place` [n + 1] of the
+same above the base and downstream of the toe, and a row of n means over the interval for each time. Times are those of
+the time series, so that forces of both add up. Room for all rows is laid down at the start, as for the snapshots: a
+process that is killed leaves a file that opens.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from warp_mpm.kernels import layout as at
+from warp_mpm.quantities.time_series import liquid as holds_liquid
+from warp_mpm.quantities.time_series import two_phases
+from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.schedule import Schedule
+from warp_mpm.recording.snapshots import FILE_OPTIONS, failures_of_the_disk
+from warp_mpm.simulator.bodies.loads import Stretch
+
+MEANINGS = {
+    "normal": "pressure of both phases on the surface, mean over the interval",
+    "liquid": "what of it the liquid phase bears",
+    "shear": "friction of the flow on the surface, mean over the interval; + along the surface, toward its next slot",
+    "pore_pressure": "pressure of the liquid, mean over the interval",
+}
+"""Data sets of a surface [times, n] in Pa."""
+
+
+class LoadsRecorder:
+    """Writes mean pressures on the slots of the barrier, at the times of the time series."""
+
+    def __init__(self, path: Path, interval: float, end_time: float, *, mark: Mapping[str, Any] | None = None):
+        """Create the file with room for the records until `end_time` [s], every `interval` [s] and at the end; or go on
+        at an earlier `mark` in it, dropping what was written after that.
+
+        Raises:
+            FileExistsError: there is one already.
+            RunFolderError: the file does not reach to the mark.
+        """
+        self.schedule = Schedule(interval)
+        self._path = path
+        self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
+        self._rows = 0
+        self._before: tuple[float, np.ndarray] | None = None
+        self._file: h5py.File | None = None
+        if mark is None:
+            self._file = h5py.File(path, "x", **FILE_OPTIONS)
+            self._file.attrs["rows"] = 0
+            return
+        self.schedule.count, self._rows = mark["records"], mark["rows"]
+        self._before = (mark["time"], np.array(mark["taken"])) if mark["rows"] else None
+        try:
+            self._file = file = h5py.File(path, "r+", **FILE_OPTIONS)
+            if int(file.attrs["rows"]) < self._rows:
+                raise ValueError("it does not reach to the checkpoint")
+            for dataset in self._datasets():
+                dataset.resize(self._room, axis=0)
+            file.attrs.modify("rows", self._rows)
+            file.flush()
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+            if isinstance(error, OSError) and error.errno is not None:
+                raise RunFolderError(f"{path} cannot be read: {os.strerror(error.errno)}.") from None
+            raise RunFolderError(f"{path} is damaged: {error}.") from None
+
+    def _datasets(self) -> list[h5py.Dataset]:
+        """Those with a row for each time."""
+        assert self._file is not None
+        found = [self._file["time"]]
+        for group in self._file.values():
+            if isinstance(group, h5py.Group):
+                found += [group[name] for name in MEANINGS if name in group]
+        return found
+
+    def mark(self) -> dict[str, Any]:
+        """Bring everything to the disk and tell where the file stands."""
+        assert self._file is not None
+        self._file.flush()
+        descriptor = os.open(self._path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        time, taken = self._before if self._before is not None else (0.0, np.zeros(0))
+        return {"records": self.schedule.count, "rows": self._rows, "time": time, "taken": taken.tolist()}
+
+    def record(self, simulation: Any) -> None:
+        """Append one row.
+
+        Raises:
+            OSError: it could not be written; those before are kept.
+        """
+        window = simulation.window()
+        taken = np.array(window.taken)
+        with failures_of_the_disk():
+            if self._rows == 0:
+                self._lay_out(simulation)
+            assert self._file is not None
+            before, sums = self._before if self._before is not None else (window.time, taken)
+            elapsed = window.time - before
+            mean = ((taken - sums) / elapsed if elapsed > 0.0 else np.zeros_like(taken)).reshape(-1, at.SLOT_SIZE)
+            for stretch in simulation.slots.stretches:
+                rows = pressures(mean[stretch.slots], stretch, simulation.scenario)
+                for name, values in rows.items():
+                    self._file[stretch.surface][name][self._rows] = values
+            self._file["time"][self._rows] = simulation.time
+            # The count goes last: until it is written, a reader does not look at the new row.
+            self._rows += 1
+            self._file.attrs.modify("rows", self._rows)
+            self._file.flush()
+        self._before = (window.time, taken)
+
+    def _lay_out(self, simulation: Any) -> None:
+        """Create every group and data set, with room for all rows."""
+        assert self._file is not None
+        file, room = self._file, self._room
+        _dataset(file, "time", (room,)).attrs["unit"] = "s"
+        for stretch in simulation.slots.stretches:
+            group = file.create_group(stretch.surface)
+            x, y = (stretch.begin[:, None] + stretch.along[:, None] * stretch.edges)[:2]
+            for name, values in (("edges", stretch.edges), ("place", x), ("height", y)):
+                group[name] = values
+                group[name].attrs["unit"] = "m"
+            for name in pressures(np.zeros((len(stretch), at.SLOT_SIZE)), stretch, simulation.scenario):
+                dataset = _dataset(group, name, (room, len(stretch)))
+                dataset.attrs["unit"], dataset.attrs["meaning"] = "Pa", MEANINGS[name]
+        file.flush()
+
+    def close(self) -> None:
+        """Give back the room that was not used and close the file."""
+        if self._file is None:
+            return
+        with failures_of_the_disk():
+            try:
+                if self._rows > 0:
+                    for dataset in self._datasets():
+                        dataset.resize(self._rows, axis=0)
+            finally:
+                file, self._file = self._file, None
+                file.close()
+
+
+def pressures(mean: np.ndarray, stretch: Stretch, scenario: Any) -> dict[str, np.ndarray]:
+    """Mean pressures [n] in Pa on the slots of a surface, by the names of `MEANINGS`, those that the scene tells.
+
+    Args:
+        mean: impulses [n, SLOT_SIZE] of the slots, over the time [N/m].
+        stretch: the surface.
+        scenario: of the run.
+    """
+    per_length = mean / np.diff(stretch.edges)[:, None]
+    normal, liquid, along = per_length.T
+    if two_phases(scenario):
+        pore = liquid / scenario.flow.material.porosity
+        return {"normal": normal + liquid, "liquid": liquid, "shear": along, "pore_pressure": pore}
+    friction = scenario.barrier.friction
+    rough = {"impact": friction.face, "top": friction.top, "back": friction.back}[stretch.surface] > 0.0
+    found = {"normal": normal, "shear": along}
+    # Of one phase the liquid's pressure is found for friction alone.
+    return found | ({"pore_pressure": liquid} if rough and holds_liquid(scenario) else {})
+
+
+def _dataset(group: h5py.Group, name: str, shape: tuple[int, ...]) -> h5py.Dataset:
+    """One whose room is set aside at once, so that filling it changes nothing in the file's structure."""
+    creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    creation.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    creation.set_chunk((min(shape[0], 1024), *shape[1:]))
+    space = h5py.h5s.create_simple(shape, (h5py.h5s.UNLIMITED, *shape[1:]))
+    kind = h5py.h5t.py_create(np.dtype(np.float64), logical=True)
+    return h5py.Dataset(h5py.h5d.create(group.id, name.encode(), kind, space, dcpl=creation))

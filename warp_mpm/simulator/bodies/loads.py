@@ -1,0 +1,133 @@
+"""Where along the barrier the flow acts: its surfaces are divided into slots, in which kernels sum up impulses.
+
+A slot is about as long as a cell. A place of contact stands for a stretch of surface around it, whose impulse goes to
+the slots that the stretch lies in by its share in each; what acts beyond the ends of a surface, as below the ground,
+goes to the slot at that end. So slots add up to the surface's reactions. They hang on the scene alone, not on its grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warp_mpm.extent import barrier_travel
+from warp_mpm.scenario import Scenario, Trapezoid
+
+from .body import Body
+from .of_scene import BARRIER
+from .places import PER_CELL, Places
+
+Array = NDArray[np.float64]
+
+MOST = 4096
+"""Slots of a surface at most."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A surface of the barrier and its n slots."""
+
+    surface: str
+    piece: int
+    """Of the outline."""
+    first: int
+    """Its first slot."""
+    begin: Array
+    """[2] from where it is measured [m]."""
+    along: Array
+    """[2] unit vector."""
+    edges: Array
+    """[n + 1] along it from `begin` [m], evenly spaced."""
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def slots(self) -> slice:
+        """Its part of all slots."""
+        return slice(self.first, self.first + len(self))
+
+    @property
+    def heights(self) -> Array:
+        """[n + 1] y of the edges at t = 0 [m]."""
+        return self.begin[1] + self.along[1] * self.edges
+
+
+@dataclass(frozen=True)
+class Slots:
+    """The barrier's surfaces, divided: face, crest, back, those that it has."""
+
+    stretches: tuple[Stretch, ...]
+    body: int
+    """Number of the barrier among the bodies."""
+
+    def __len__(self) -> int:
+        return sum(len(stretch) for stretch in self.stretches)
+
+    @cached_property
+    def face(self) -> Stretch:
+        """The impacted one."""
+        return self.stretches[0]
+
+    def shares(self, places: Places, spacing: float) -> tuple[NDArray[np.int32], Array]:
+        """Slot [C] of each place of contact, -1 of one that is none of the barrier's, and the share [C] of its impulse
+        that goes there; the rest goes to the next slot."""
+        slot, share = np.full(len(places), -1, dtype=np.int32), np.ones(len(places))
+        for stretch in self.stretches:
+            own = np.flatnonzero((places.body == self.body) & (places.piece == stretch.piece))
+            # A pair of nodes stands for a cell's side, a point of the surface for half of it.
+            width = np.where(places.first[own] >= 0, spacing, spacing / PER_CELL)
+            start = (places.position[own] - stretch.begin) @ stretch.along - 0.5 * width - stretch.edges[0]
+            length = stretch.edges[1] - stretch.edges[0]
+            number = np.floor(start / length + 1e-9)
+            part = np.clip(((number + 1.0) * length - start) / width, 0.0, 1.0)
+            part[(number < 0) | (number >= len(stretch) - 1) | (part > 1.0 - 1e-6)] = 1.0
+            slot[own] = stretch.first + np.clip(number, 0, len(stretch) - 1)
+            share[own] = part
+        return slot, share
+
+    def feet(self, places: Places) -> Array:
+        """Points [C, 2] on the surface at t = 0 [m] where the barrier's places act; those of others are nil."""
+        feet = np.zeros((len(places), 2))
+        for stretch in self.stretches:
+            own = (places.body == self.body) & (places.piece == stretch.piece)
+            reach = (places.position[own] - stretch.begin) @ stretch.along
+            feet[own] = stretch.begin + reach[:, None] * stretch.along
+        return feet
+
+
+def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> Slots | None:
+    """The slots of the scenario's barrier; None without one."""
+    if scenario.barrier is None:
+        return None
+    body = [one.name for one in bodies].index(BARRIER)
+    pieces = bodies[body].outline.segments
+    names = [bodies[body].surfaces[number].name for number in bodies[body].surface_of_piece]
+    found: list[Stretch] = []
+    for number, (surface, (low, high)) in enumerate(zip(names, _ends(scenario, pieces.begin), strict=True)):
+        count = int(min(max(1.0, (high - low) / scenario.numerics.spacing_m + 1e-9), MOST))
+        first = found[-1].first + len(found[-1]) if found else 0
+        edges = np.linspace(low, high, count + 1)
+        found.append(Stretch(surface, number, first, pieces.begin[number], pieces.along[number], edges))
+    return Slots(tuple(found), body)
+
+
+def _ends(scenario: Scenario, begins: Array) -> list[tuple[float, float]]:
+    """Where each surface begins and ends along itself [m]. A wall has no end; what the flow would reach with twice its
+    energy is divided."""
+    assert scenario.barrier is not None
+    shape, flow = scenario.barrier.shape, scenario.flow
+    if isinstance(shape, Trapezoid):
+        corners = shape.polygon
+        # A crest without width still has a slot, of no length to speak of.
+        return [(0.0, max(float(np.hypot(*(b - a))), 1e-9)) for a, b in pairwise(corners)]
+    (low, high), g = (flow.polygon[:, 1].min(), flow.polygon[:, 1].max()), -scenario.gravity.vector[1]
+    speed = flow.speed + barrier_travel(scenario).speed
+    reach = flow.depth + (speed**2 / g if g > 0.0 else speed * scenario.output.end_time_s)
+    low = 0.0 if scenario.ground is not None else float(low) - reach
+    return [(low - float(begins[0, 1]), float(high) + reach - float(begins[0, 1]))]
