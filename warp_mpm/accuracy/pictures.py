@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from warp_mpm.accuracy.errors import QUANTITIES
+from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
 from warp_mpm.accuracy.study import DEFAULT, KNOBS, level_text
 from warp_mpm.accuracy.tables import formula_errors
@@ -29,6 +29,9 @@ SHOWN_BELOW_DOUBT = 5.0
 MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^2v<>H1x", strict=True))
 """One for each knob: its points are told apart although there are fewer colours than knobs."""
 
+FLOOR = "#EEEEEE"
+"""Colour of errors that are below what the reference is known to."""
+
 FORMULA_MARKERS = "*PXphd8"
 
 LABEL_PLACES = (
@@ -39,12 +42,23 @@ LABEL_PLACES = (
 
 PANELS = (
     *("overall", "peak_force", "impulse", "barrier_displacement_final", "barrier_velocity_max", "impact_duration"),
-    *("peak_force_time", "pore_pressure_max", "overtopped_volume", "force_curve", "energy_curve", "displacement_curve"),
+    *(
+        "peak_force_time",
+        "pressure_patch_max",
+        "overtopped_volume",
+        "force_curve",
+        "energy_curve",
+        "displacement_curve",
+    ),
 )
 
 
 def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
-    """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left."""
+    """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left.
+
+    Above each panel stands how the error falls along the cheapest choices; a dashed line of that slope goes through
+    them. Grey is what the reference is not known to.
+    """
     names = [name for name in PANELS if name == "overall" or name in study.references.names]
     columns = 4
     rows = math.ceil(len(names) / columns)
@@ -86,6 +100,7 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
         [r.time for r in best], [_drawn(error_of(r, name), least) for r in best], "o-", color=GREY, linewidth=1.2,
         markersize=11, markerfacecolor="none", zorder=1, label="cheapest choices",
     )  # fmt: skip
+    _draw_slope(panel, study, name)
     for number, formula in enumerate(found):
         error = formula_errors(study, formula).get(name)
         if error is not None:
@@ -93,11 +108,23 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
                 formula.time, _drawn(abs(error), least), FORMULA_MARKERS[number % len(FORMULA_MARKERS)],
                 color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
             )  # fmt: skip
-    panel.axhspan(least / 2, max(doubt, least), color="#EEEEEE", zorder=0)
+    panel.axhspan(least / 2, max(doubt, least), color=FLOOR, zorder=0)
     _logarithmic(panel, least)
-    panel.set_title(_title(name), fontsize=9)
+    panel.set_title(f"{_title(name)}\n{study.slopes[name]}", fontsize=9)
     panel.set_xlabel("CPU time", fontsize=8)
     panel.set_ylabel("error (grey: reference unsure)", fontsize=8)
+
+
+def _draw_slope(panel: Axes, study: Study, name: str) -> None:
+    """A line of the slope with which the error falls, through the cheapest choices that are above the doubt."""
+    power, doubt = study.slopes[name].cost, study.doubt(name)
+    if power is None:
+        return
+    time, error = np.array(
+        [(r.time, error_of(r, name)) for r in study.fronts[name] if r.time > 0.0 and error_of(r, name) > doubt]
+    ).T
+    middle = np.exp(np.log(error).mean()) * (time / np.exp(np.log(time).mean())) ** -power
+    panel.plot(time, middle, "--", color="black", linewidth=1.0, zorder=3, label="their slope")
 
 
 def _name_spacings(panel: Axes, study: Study, name: str) -> None:
@@ -138,7 +165,7 @@ def error_of_each_knob(study: Study) -> Figure:
         panel.set_axis_off()
     ladder = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda r: r.setting.spacing)
     spacings = [row.setting.spacing for row in ladder]
-    for number, name in enumerate([*study.references.key_names, "pore_pressure_max", "energy_curve"]):
+    for number, name in enumerate([*study.references.told_names, "energy_curve"]):
         if name not in study.references.names:
             continue
         reference = study.references.scalars.get(name)
@@ -216,6 +243,40 @@ def where_time_goes(study: Study) -> Figure:
     kernels.barh(names, [100.0 * shares[name] for name in names], color=BLUE)
     kernels.set_xlabel("share of a step [%], launched one by one")
     kernels.set_title(f"kernels at spacing {ladder[-1].setting.spacing:g} m", fontsize=9)
+    return figure
+
+
+def error_against_cost(studies: Sequence[Study]) -> Figure:
+    """Error of each key figure against time along the ladder of spacings, a panel for each scene.
+
+    Above each panel stands how the worst of them falls; grey is what its reference is not known to.
+    """
+    columns = min(4, len(studies))
+    rows = math.ceil(len(studies) / columns)
+    figure = Figure(figsize=(3.7 * columns + 0.4, 3.2 * rows + 0.7), layout="constrained")
+    figure.suptitle("Error of the key figures against CPU time (grey: reference unsure)", fontsize=12)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel in panels[len(studies) :]:
+        panel.set_axis_off()
+    handles: dict[str, Any] = {}
+    for panel, study in zip(panels, studies, strict=False):
+        own = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda row: row.time)
+        least = _least(study, "overall")
+        for number, name in enumerate(KEY_QUANTITIES):
+            if name in study.references.scalars:
+                panel.plot(
+                    [row.time for row in own], [_drawn(error_of(row, name), least) for row in own], "o-", markersize=4,
+                    color=RUN_COLOURS[number], linewidth=1.0, label=QUANTITIES[name].label,
+                )  # fmt: skip
+        _draw_slope(panel, study, "overall")
+        panel.axhspan(least / 2, max(study.doubt("overall"), least), color=FLOOR, zorder=0)
+        _logarithmic(panel, least)
+        panel.set_title(f"{study.scenario.title}\nthe worst: {study.slopes['overall']}", fontsize=8, wrap=True)
+        panel.set_xlabel("CPU time", fontsize=8)
+        panel.set_ylabel("error", fontsize=8)
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=4, fontsize=8)
     return figure
 
 
