@@ -30,13 +30,14 @@ class Budget:
     """Parts of the relative uncertainty of each quantity's reference.
 
     The spacing's part is that of the extrapolation along the ladder. A ladder at one Courant number and one strength of
-    each filter cannot see what all its runs share, so each such setting was refined alone, by two, at twice the finest
-    spacing. The causes have nothing to do with each other, so the changes are joined as the root of their squares. The
-    run in which all settings are refined at once is the test of that: where it is farther off, its change counts.
+    each filter cannot see what all its runs share, so each such setting was refined alone, by two, at a spacing of
+    twice the finest or more. The causes have nothing to do with each other, so the changes are joined as the root of
+    their squares. The run in which all settings are refined at once is the test of that: where it is farther off, its
+    change counts.
 
-    Halving takes half of an effect of first order away, and at twice the finest spacing an effect that falls with the
-    spacing is twice as large as at the finest: then the change is what the finest run still has of it, and is taken as
-    it is. Where the runs with everything refined, at two spacings, do not show that it falls, it counts twice.
+    Halving takes half of an effect of first order away, and an effect that falls with the spacing is twice as large
+    there as at the finest, or more: then the change is no less than what the finest run still has of it, and is taken
+    as it is. Where the runs with everything refined, at two spacings, do not show that it falls, it counts twice.
     """
 
     spacing: Mapping[str, float]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -271,7 +272,8 @@ def error_against_cost(studies: Sequence[Study]) -> Figure:
         _draw_slope(panel, study, "overall")
         panel.axhspan(least / 2, max(study.doubt("overall"), least), color=FLOOR, zorder=0)
         _logarithmic(panel, least)
-        panel.set_title(f"{study.scenario.title}\nthe worst: {study.slopes['overall']}", fontsize=8, wrap=True)
+        title = textwrap.fill(study.scenario.title, 52, max_lines=2)
+        panel.set_title(f"{title}\nthe worst: {study.slopes['overall']}", fontsize=8)
         panel.set_xlabel("CPU time", fontsize=8)
         panel.set_ylabel("error", fontsize=8)
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):

@@ -25,9 +25,10 @@ COMBINATION_SPACINGS = (2.0, 1.5, 1.0)
 KNOB_SPACING = 1.5
 """Spacing over the scenario's own at which a knob is turned alone."""
 
-REFINED_SPACINGS = (2.0, 4.0)
+REFINED_SPACINGS, FULL_REFINED_SPACINGS = (2.0, 4.0), (3.0, 6.0)
 """Spacings over the finest of the ladder, at the least, at which what the ladder shares is refined: at the first each
-setting alone and all at once, at the second all at once."""
+setting alone and all at once, at the second all at once. The other pair is a full study's, whose finest runs are dear.
+"""
 
 HALVED = ("courant_number", "pressure_relaxation", "bulk_viscosity", "density_correction")
 """Settings of `numerics` that a ladder of spacings shares, and that are refined by halving: the time step, filters."""
@@ -98,7 +99,9 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
     """
     own, base = scenario.numerics.spacing_m, _bare(scenario)
     settings = ladder(scenario, [own * factor for factor in (QUICK_SPACINGS if quick else FULL_SPACINGS)])
-    shared = refined(scenario, [setting.spacing for setting in settings])
+    shared = refined(
+        scenario, [setting.spacing for setting in settings], REFINED_SPACINGS if quick else FULL_REFINED_SPACINGS
+    )
     at = own * KNOB_SPACING
     for knob, levels in KNOBS.items():
         # Other formulations have no drag: nothing to turn there.
@@ -147,15 +150,18 @@ def refinements(scenario: Scenario) -> dict[str, dict[str, Any]]:
     return found | {EVERYTHING: {path: value for change in found.values() for path, value in change.items()}}
 
 
-def refined(scenario: Scenario, spacings: Sequence[float]) -> list[Setting]:
-    """Runs that tell what the settings do that a ladder of these spacings [m] shares; see `REFINED_SPACINGS`.
+def refined(
+    scenario: Scenario, spacings: Sequence[float], factors: Sequence[float] = REFINED_SPACINGS
+) -> list[Setting]:
+    """Runs that tell what the settings do that a ladder of these spacings [m] shares.
 
-    Each has the spacing of a rung, against which it is held.
+    Each has the spacing of a rung, against which it is held: the next one at or above a factor times the finest, with
+    each setting refined alone, and all of them, at the first factor, and all of them at the second.
     """
     base, finest = _bare(scenario), min(spacings)
     changes = refinements(base)
     settings = []
-    for factor, names in zip(REFINED_SPACINGS, ([*changes], [EVERYTHING]), strict=True):
+    for factor, names in zip(factors, ([*changes], [EVERYTHING]), strict=True):
         at = min((one for one in spacings if one >= factor * finest * (1.0 - 1e-9)), default=max(spacings))
         settings += [_refined(base, name, changes[name], at) for name in names]
     return list({setting.key: setting for setting in settings}.values())
