@@ -15,9 +15,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
+from warp_mpm.accuracy import check as checking
 from warp_mpm.accuracy import keys, shipped
 from warp_mpm.accuracy.budget import Budget
-from warp_mpm.accuracy.check import Check, Got, drawn, holds, table, truth_of
+from warp_mpm.accuracy.check import Check, Got, check, drawn, holds, table, truth_of
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.keys import MEASUREMENT, code_text, imported_by, run_key, scenario_fields, scene_key
@@ -745,6 +746,34 @@ class TestCheck:
         assert (one.error_holds, one.time_holds) == (True, True)
         with pytest.raises(ValueError, match="finer run of the scene a scene failed: it did"):
             self.GOT.held_against(truth, {"status": "diverged", "problem": "it did", "figures": {}})
+
+    def test_buys_and_runs_the_truth_once(
+        self, scene: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The second time all is read, what was bought and what is true."""
+        bought: list[float | None] = []
+
+        def got(scene: Scenario, budget: float | None) -> Got:
+            bought.append(budget)
+            figures = measure(scene.replaced({"numerics.spacing_m": 1.0}))["figures"]
+            names = ("peak_force", "impulse")
+            return Got(scene.title, 1.0, "5%", 0.5, 4.0, 5.0, {name: figures[name] for name in names})
+
+        monkeypatch.setattr(checking, "_got", got)
+        monkeypatch.setattr(checking, "TRUE_CELLS", 4.0)
+        scenes = [scene.replaced({"output.end_time_s": 0.5, "title": title}) for title in ("first", "second")]
+        scenes[1] = scenes[1].replaced({"barrier.motion": {"kind": "fixed"}})
+        said: list[str] = []
+        first = check(scenes, tmp_path, on_progress=said.append)
+        assert [one.scene for one in first] == ["first", "second"]
+        assert bought == [None, checking.BUDGET]
+        assert all(one.true_spacing == pytest.approx(0.5) and one.true_error > 0.0 for one in first)
+        assert any("promised 50.0% in 4 s, run in 5 s" in line for line in said)
+        assert "finer runs: 2 done, 0 running, 0 left" in said
+        said.clear()
+        assert check(scenes, tmp_path, on_progress=said.append) == first
+        assert len(bought) == 2
+        assert not any("1 running" in line for line in said)
 
 
 class TestRunner:

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from warp_mpm.accuracy import purchase, shipped, study
+from warp_mpm.accuracy import purchase, runner, shipped
 from warp_mpm.accuracy.keys import scene_key
 from warp_mpm.accuracy.report import put_into_page
 from warp_mpm.cli import app
+from warp_mpm.engine import Ended, Task
 from warp_mpm.scenario import Scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+class Here:
+    """An engine without processes, whose start takes longer than what many a test runs in them."""
+
+    def __init__(self, at_once: int):
+        pass
+
+    def run(self, tasks: Sequence[Task], *, on_start: Callable[[Task], None]) -> Iterator[Ended]:
+        for task in tasks:
+            on_start(task)
+            yield Ended(task, task.function(*task.arguments))
 
 
 @pytest.fixture
@@ -61,9 +75,7 @@ def test_buys_runs_and_settles(coarse: Path, tmp_path: Path, monkeypatch: pytest
 def test_ladders_of_several_scenes_and_their_data(
     coarse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    every = study.refinements
-    few = ("courant_number", study.EVERYTHING)  # each is a process of its own
-    monkeypatch.setattr(study, "refinements", lambda scenario: {name: every(scenario)[name] for name in few})
+    monkeypatch.setattr(runner, "Processes", Here)
     fixed = tmp_path / "fixed.json"
     content = json.loads(coarse.read_text())
     content["barrier"]["motion"] = {"kind": "fixed"}
@@ -72,8 +84,8 @@ def test_ladders_of_several_scenes_and_their_data(
     command = ["accuracy", str(coarse), str(fixed), "--quick", "--jobs", "1", "--out", str(out), "--data", str(data)]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.stderr
-    # Four spacings each, a setting refined at one of them, and all at once at two.
-    assert "14 done, 0 running, 0 left" in result.stderr
+    # Four spacings each, seven settings refined at one of them, and all at once at two.
+    assert "26 done, 0 running, 0 left" in result.stderr
     for picture in ("closed_form", "error_against_cost"):
         assert (out / f"{picture}.png").stat().st_size > 10_000
     assert "closed form, paper's λ" in (out / "closed_form.md").read_text()
@@ -93,7 +105,7 @@ def test_ladders_of_several_scenes_and_their_data(
     # The same again: nothing is run.
     again = CliRunner().invoke(app, command)
     assert "running (" not in again.stderr
-    assert "14 done, 0 running, 0 left" in again.stderr
+    assert "26 done, 0 running, 0 left" in again.stderr
 
 
 def test_accuracy_refuses_a_folder_that_is_none(coarse: Path, tmp_path: Path) -> None:
