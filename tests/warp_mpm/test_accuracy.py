@@ -781,7 +781,8 @@ class TestRunner:
         short = scene.replaced({"output.end_time_s": 0.05, "numerics.spacing_m": 0.8})
         settings = ladder(short, [1.0, 0.8])
         seen: list[StudyProgress] = []
-        first = run_settings(settings, tmp_path, jobs=1, on_progress=seen.append)
+        twice = [*settings, replace(settings[0], refined=True)]  # a choice that is also looked at for the reference
+        first = run_settings(twice, tmp_path, jobs=1, on_progress=seen.append)
         assert (seen[-1].done, seen[-1].left) == (2, 0)
         assert all(p.done + len(p.running) + p.left == 2 for p in seen)
         (tmp_path / f"{settings[0].key}.json").unlink()
