@@ -509,10 +509,22 @@ class TestSlopes:
 
     def test_errors_that_jump_show_no_order(self, scene: Scenario) -> None:
         spacings = [0.8, 0.6, 0.4, 0.3, 0.1, 0.05]
-        shift = dict(zip(spacings, (0.2, 0.9, 0.1, 0.8, 0.0, 0.0), strict=True))
+        shift = dict(zip(spacings, (0.9, 0.1, 0.5, 0.01, 0.0, 0.0), strict=True))
         settings = ladder(scene, spacings)
-        results = {s.key: made_up(s.scenario, order=2.0, wobble=shift[s.spacing]) for s in settings}
-        assert evaluate(scene, settings, results).slopes["impulse"].spacing is None
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=shift[s.spacing]) for s in settings}
+        study = evaluate(scene, settings, results)
+        assert sum(row.errors["impulse"] > study.doubt("impulse") for row in study.rows) >= 3
+        assert study.slopes["impulse"].spacing is None
+
+    def test_what_lies_below_the_doubt_bends_nothing(self, scene: Scenario) -> None:
+        off = {1.6: 0.8, 0.8: 0.4, 0.4: 0.2, 0.2: 0.001, 0.1: 0.0, 0.05: 0.02}
+        settings = ladder(scene, list(off))
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=off[s.spacing]) for s in settings}
+        study = evaluate(scene, settings, results)
+        rows = [row for row in study.rows if abs(row.errors["impulse"]) > study.doubt("impulse")]
+        assert {row.setting.spacing for row in rows} == {1.6, 0.8, 0.4}
+        spacings, wrong = np.log([[row.setting.spacing, row.errors["impulse"]] for row in rows]).T
+        assert study.slopes["impulse"].spacing == pytest.approx(np.polyfit(spacings, wrong, 1)[0])
 
 
 class TestPictures:
@@ -530,6 +542,10 @@ class TestPictures:
             assert floor.get_y() + floor.get_height() == pytest.approx(study.doubt("overall"))
         titles = [panel.get_title() for panel in error_against_time(study, []).axes if panel.axison]
         assert all("cost^-" in title for title in titles[:3])
+        for panel in error_against_time(study, []).axes[:3]:
+            (line,) = [line for line in panel.lines if line.get_label() == "their slope"]
+            time, error = np.log(line.get_xdata()), np.log(line.get_ydata())
+            assert -np.polyfit(time, error, 1)[0] == pytest.approx(study.slopes["peak_force"].cost, rel=0.05)
 
     def test_settings_and_spacings_are_told_apart(self, scene: Scenario) -> None:
         settings = plan(scene, quick=False)
