@@ -18,20 +18,21 @@ from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
 from warp_mpm.accuracy.study import DEFAULT, KNOBS, level_text
 from warp_mpm.accuracy.tables import formula_errors
-from warp_mpm.accuracy.verdict import Study, error_of
+from warp_mpm.accuracy.verdict import Study, error_of, sloping
 from warp_mpm.plotting.style import BLUE, GREY, ORANGE, RUN_COLOURS, grid
 
 LEAST_ERROR = 1e-4
 """Errors below are drawn here: less than any reference is known to."""
 
 SHOWN_BELOW_DOUBT = 5.0
-"""How far the panels go on below what the reference is known to; what is less is drawn on the lower edge."""
+"""How far the panels go on below what the spacing lets the reference be known to; what is less is drawn on the lower
+edge."""
 
 MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^2v<>H1x", strict=True))
 """One for each knob: its points are told apart although there are fewer colours than knobs."""
 
-FLOOR = "#EEEEEE"
-"""Colour of errors that are below what the reference is known to."""
+FLOOR, SPACING_FLOOR = "#EEEEEE", "#DADADA"
+"""Colours of errors that are below what the reference is known to, and below the spacing's part of that."""
 
 FORMULA_MARKERS = "*PXphd8"
 
@@ -57,8 +58,8 @@ PANELS = (
 def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
     """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left.
 
-    Above each panel stands how the error falls along the cheapest choices; a dashed line of that slope goes through
-    them. Grey is what the reference is not known to.
+    Above each panel stands how the error falls as the spacing does; a dashed line of that slope goes through the runs
+    from which it is told. Grey is what the reference is not known to, dark grey the spacing's part of that.
     """
     names = [name for name in PANELS if name == "overall" or name in study.references.names]
     columns = 4
@@ -84,7 +85,7 @@ def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
 
 def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula]) -> None:
     knobs = [DEFAULT, *(knob for knob in KNOBS if any(row.setting.knob == knob for row in study.rows))]
-    doubt, least = study.doubt(name), _least(study, name)
+    least = _least(study, name)
     for number, knob in enumerate(knobs):
         rows = [r for r in study.rows if r.setting.knob == knob and math.isfinite(error_of(r, name))]
         panel.plot(
@@ -109,7 +110,7 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
                 formula.time, _drawn(abs(error), least), FORMULA_MARKERS[number % len(FORMULA_MARKERS)],
                 color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
             )  # fmt: skip
-    panel.axhspan(least / 2, max(doubt, least), color=FLOOR, zorder=0)
+    _draw_floor(panel, study, name)
     _logarithmic(panel, least)
     panel.set_title(f"{_title(name)}\n{study.slopes[name]}", fontsize=9)
     panel.set_xlabel("CPU time", fontsize=8)
@@ -117,15 +118,20 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
 
 
 def _draw_slope(panel: Axes, study: Study, name: str) -> None:
-    """A line of the slope with which the error falls, through the cheapest choices that are above the doubt."""
-    power, doubt = study.slopes[name].cost, study.doubt(name)
+    """A line of the slope with which the error falls, through the runs from which it is told."""
+    power = study.slopes[name].cost
     if power is None:
         return
-    time, error = np.array(
-        [(r.time, error_of(r, name)) for r in study.fronts[name] if r.time > 0.0 and error_of(r, name) > doubt]
-    ).T
+    time, error = np.array([(row.time, error_of(row, name)) for row in sloping(study, name) if row.time > 0.0]).T
     middle = np.exp(np.log(error).mean()) * (time / np.exp(np.log(time).mean())) ** -power
-    panel.plot(time, middle, "--", color="black", linewidth=1.0, zorder=3, label="their slope")
+    panel.plot(time, middle, "--", color="black", linewidth=1.2, zorder=3, label="slope along the spacings")
+
+
+def _draw_floor(panel: Axes, study: Study, name: str) -> None:
+    """What the reference is not known to, and in it, darker, the spacing's part."""
+    least = _least(study, name)
+    panel.axhspan(least / 2, max(study.doubt(name), least), color=FLOOR, zorder=-1)
+    panel.axhspan(least / 2, max(study.spacing_doubt(name), least), color=SPACING_FLOOR, zorder=0)
 
 
 def _name_spacings(panel: Axes, study: Study, name: str) -> None:
@@ -250,7 +256,8 @@ def where_time_goes(study: Study) -> Figure:
 def error_against_cost(studies: Sequence[Study]) -> Figure:
     """Error of each key figure against time along the ladder of spacings, a panel for each scene.
 
-    Above each panel stands how the worst of them falls; grey is what its reference is not known to.
+    Above each panel stands how the worst of them falls. Grey is what its reference is not known to, dark grey the
+    spacing's part of that.
     """
     columns = min(4, len(studies))
     rows = math.ceil(len(studies) / columns)
@@ -270,7 +277,7 @@ def error_against_cost(studies: Sequence[Study]) -> Figure:
                     color=RUN_COLOURS[number], linewidth=1.0, label=QUANTITIES[name].label,
                 )  # fmt: skip
         _draw_slope(panel, study, "overall")
-        panel.axhspan(least / 2, max(study.doubt("overall"), least), color=FLOOR, zorder=0)
+        _draw_floor(panel, study, "overall")
         _logarithmic(panel, least)
         title = textwrap.fill(study.scenario.title, 52, max_lines=2)
         panel.set_title(f"{title}\nthe worst: {study.slopes['overall']}", fontsize=8)
@@ -327,7 +334,7 @@ def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]])
 
 def _least(study: Study, name: str) -> float:
     """The lower edge of a panel, on which lesser errors are drawn."""
-    return max(LEAST_ERROR, study.doubt(name) / SHOWN_BELOW_DOUBT)
+    return max(LEAST_ERROR, study.spacing_doubt(name) / SHOWN_BELOW_DOUBT)
 
 
 def _drawn(error: float, least: float = LEAST_ERROR) -> float:

@@ -97,12 +97,16 @@ class Knob:
 
 @dataclass(frozen=True)
 class Slope:
-    """How an error falls, while it is above what the reference is known to."""
+    """How an error falls along the ladder of the scenario's own settings, above the spacing's part of the doubt.
+
+    What the settings do that all spacings share is the same mistake in the runs and in the reference, so it hides no
+    order of the spacing.
+    """
 
     cost: float | None
-    """x in error ~ cost^-x along the front; None where it does not fall like that."""
+    """x in error ~ cost^-x; None where it does not fall like that."""
     spacing: float | None
-    """p in error ~ spacing^p along the ladder of the scenario's own settings; None where it does not fall like that."""
+    """p in error ~ spacing^p; None where it does not fall like that."""
 
     def __str__(self) -> str:
         parts = []
@@ -110,7 +114,7 @@ class Slope:
             parts.append(f"error ~ cost^-{self.cost:.2g}")
         if self.spacing is not None:
             parts.append(f"{'' if parts else 'error '}~ spacing^{self.spacing:.2g}")
-        return ", ".join(parts) or "no order above the doubt"
+        return ", ".join(parts) or "no order seen"
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,7 @@ class Study:
     fronts: dict[str, list[Row]] = field(repr=False)
     """By quantity and for `overall`: the cheapest choices, cheap first."""
     slopes: dict[str, Slope] = field(repr=False)
-    """How the error falls along them, by the same names."""
+    """How the error falls with cost and spacing, by the same names."""
 
     def price(self, name: str, target: float) -> Row | None:
         """The cheapest setting that keeps an error; None where none does.
@@ -144,6 +148,11 @@ class Study:
     def doubt(self, name: str) -> float:
         """Relative uncertainty of a quantity's reference; for `overall` the greatest of the key quantities'."""
         return self.references.uncertainty(self.worst if name == "overall" else name)
+
+    def spacing_doubt(self, name: str) -> float:
+        """The spacing's part of that uncertainty; for `overall` the greatest of the key quantities'."""
+        names = self.references.key_names if name == "overall" else [name]
+        return max(self.references.budget.spacing[key] for key in names)
 
     @property
     def worst(self) -> str:
@@ -235,26 +244,35 @@ def evaluate(scenario: Scenario, settings: Sequence[Setting], results: Mapping[s
     ]
     fronts = {name: front(numeric, name, found.uncertainty(name)) for name in found.names}
     fronts["overall"] = front(numeric, "overall", doubt)
-    own = sorted(default.values(), key=lambda row: row.setting.spacing)
-    slopes = {
-        name: Slope(
-            _falling([(1.0 / row.time, error_of(row, name)) for row in rows if row.time > 0.0], found, name, doubt),
-            _falling([(row.setting.spacing, error_of(row, name)) for row in own], found, name, doubt),
-        )
-        for name, rows in fronts.items()
-    }
     refined = [row for row in rows if row.setting.refined]
-    return Study(scenario, found, numeric, refined, effects, knobs, fronts, slopes)
+    study = Study(scenario, found, numeric, refined, effects, knobs, fronts, {})
+    for name in fronts:
+        above = sloping(study, name)
+        cost = _falling([(1.0 / row.time, error_of(row, name)) for row in above if row.time > 0.0])
+        study.slopes[name] = Slope(cost, _falling([(row.setting.spacing, error_of(row, name)) for row in above]))
+    return study
 
 
-def _falling(points: Sequence[tuple[float, float]], found: References, name: str, doubt: float) -> float | None:
-    """Power with which the second of each pair falls with the first, of those above what the reference is known to;
-    None where these are too few, or fall otherwise."""
-    floor = doubt if name == "overall" else found.uncertainty(name)
-    above = [(size, error) for size, error in points if floor < error < math.inf]
-    if len(above) < LADDER:
+def sloping(study: Study, name: str) -> list[Row]:
+    """The runs of the ladder of the scenario's own settings from whose errors it is told how these fall: those above
+    the spacing's part of the doubt, without a run that is itself the reference."""
+    known = study.references
+    names = known.key_names if name == "overall" else [name]
+    extrapolated = all(key in known.scalars and known.scalars[key].order is not None for key in names)
+    return [
+        row
+        for row in study.rows
+        if row.setting.knob == DEFAULT
+        and (extrapolated or row.result is not known.finest)
+        and study.spacing_doubt(name) < error_of(row, name) < math.inf
+    ]
+
+
+def _falling(points: Sequence[tuple[float, float]]) -> float | None:
+    """Power with which the second of each pair falls with the first; None where they are too few, or it does not."""
+    if len(points) < LADDER:
         return None
-    size, error = np.log(np.array(above)).T
+    size, error = np.log(np.array(points)).T
     slope, offset = np.polyfit(size, error, 1)
     rest = float(np.sum((error - slope * size - offset) ** 2))
     straight = rest <= UNEXPLAINED * float(np.sum((error - error.mean()) ** 2))
@@ -293,7 +311,10 @@ def sentences(study: Study) -> list[str]:
         answer = "; ".join(prices) if prices else f"no run keeps {TARGETS[0]:.0%}, the best is off by {best:.1%}"
         said.append(f"{label}: {answer}; the reference is known to {doubt:.1%}.")
     said += _known_to(study)
-    said.append(f"Along the cheapest choices, down to what the reference is known to: {study.slopes['overall']}.")
+    said.append(
+        f"As the spacing falls, down to its own part of the uncertainty of the key figures, "
+        f"{study.spacing_doubt('overall'):.1%}: {study.slopes['overall']}."
+    )
     for knob in study.knobs:
         said.append(
             f"{knob.name} {level_text(knob.level)}: {knob.verdict}: {knob.time_ratio:.2g} times the time, error "
