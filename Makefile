@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: run test test-browser coverage lint validate docs clean
+.PHONY: run test test-browser coverage lint validate accuracy docs clean
 
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -37,6 +37,14 @@ coverage: $(VENV)/.test
 
 validate: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
+
+# What docs/accuracy.md shows and `run --accuracy` knows. Interrupted, the same command goes on where it stopped.
+accuracy: $(VENV)/.run
+	$(BIN)/python -m warp_mpm accuracy scenarios/set_*.json scenarios/case_1.json --quick \
+		--data warp_mpm/accuracy/paper_scenes.json --page docs/accuracy.md
+	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --page docs/accuracy.md
+	$(BIN)/python -m warp_mpm accuracy scenarios/set_iib.json --quick --page docs/accuracy.md
+	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --check --until 4 --page docs/accuracy.md
 
 docs: $(VENV)/.test
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict -f docs/site/mkdocs.yml   # pages in build/site

@@ -40,6 +40,13 @@ def test_scenes_and_types_are_packed(monkeypatch):
     assert {Path(package, "py.typed") for package in ("warp_mpm", "analytic", "fmu")} <= set(files)
 
 
+def test_every_pattern_packs_something():
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]
+    folders = {"warp_mpm.scenarios": ROOT / "scenarios"}
+    for package, its in patterns.items():
+        assert [one for one in its if not list(folders.get(package, ROOT / package).glob(one))] == [], package
+
+
 def test_every_package_is_packed(monkeypatch):
     arguments = {}
     monkeypatch.setattr(setuptools, "setup", arguments.update)

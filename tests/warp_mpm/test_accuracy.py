@@ -15,27 +15,31 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
-from warp_mpm.accuracy import keys, purchase
-from warp_mpm.accuracy.check import Check, drawn, holds, table
+from warp_mpm.accuracy import check as checking
+from warp_mpm.accuracy import keys, shipped
+from warp_mpm.accuracy.budget import Budget
+from warp_mpm.accuracy.check import Check, Got, check, drawn, holds, table, truth_of
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
 from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.keys import MEASUREMENT, code_text, imported_by, run_key, scenario_fields, scene_key
-from warp_mpm.accuracy.measure import measure
-from warp_mpm.accuracy.pictures import error_against_time
-from warp_mpm.accuracy.purchase import (
-    PurchaseError,
-    Rung,
-    aligned,
-    choose,
-    peak_mean,
-    percent,
-    seconds,
-    sold_spacings,
-)
+from warp_mpm.accuracy.measure import judged_series, measure
+from warp_mpm.accuracy.offer import PurchaseError, Rung, choose, peak_mean, percent, seconds
+from warp_mpm.accuracy.pictures import error_against_cost, error_against_time
 from warp_mpm.accuracy.runner import StudyProgress, run_settings
-from warp_mpm.accuracy.study import COMBINATIONS, DEFAULT, KNOBS, ladder, plan
-from warp_mpm.accuracy.tables import csv_table, markdown
-from warp_mpm.accuracy.verdict import Study, evaluate, front
+from warp_mpm.accuracy.spacings import aligned, sold_spacings
+from warp_mpm.accuracy.study import (
+    COMBINATIONS,
+    DEFAULT,
+    EVERYTHING,
+    KNOBS,
+    Setting,
+    known_ladder,
+    ladder,
+    plan,
+    refined_everything,
+)
+from warp_mpm.accuracy.tables import budget_table, csv_table, markdown
+from warp_mpm.accuracy.verdict import Study, evaluate, front, sentences
 from warp_mpm.scenario import Scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -46,10 +50,14 @@ def scene() -> Scenario:
     return Scenario.load(SCENARIOS / "case_1.json").replaced({"numerics.spacing_m": 0.4, "output.end_time_s": 1.0})
 
 
-def made_up(scenario: Scenario, *, order: float = 1.0, wobble: float = 0.0) -> dict[str, Any]:
-    """A result that follows a law: f = f0 (1 + 0.1 h^order), and time that falls with the cube of the spacing."""
+def made_up(scenario: Scenario, *, order: float = 1.0, wobble: float = 0.0, shared: float = 0.0) -> dict[str, Any]:
+    """A result that follows a law: f = f0 (1 + 0.1 h^order), and time that falls with the cube of the spacing.
+
+    Courant number and relaxation move it besides, at every spacing alike: by `shared` each, of 0.95 and of 0.2.
+    """
     numerics = scenario.numerics
     off = 0.1 * numerics.spacing_m**order + wobble
+    off += shared * (numerics.courant_number / 0.95 + numerics.pressure_relaxation / 0.2)
     if numerics.points_per_cell == 1:
         off += 0.2
     time = [0.0, 0.5, 1.0]
@@ -122,12 +130,55 @@ class TestExtrapolation:
 class TestPlan:
     def test_holds_every_knob_a_ladder_and_every_effect_once(self, scene: Scenario) -> None:
         settings = plan(scene, quick=True)
-        assert {s.knob for s in settings if not s.physics} == {DEFAULT, *KNOBS}
+        assert {s.knob for s in settings if not s.physics and not s.refined} == {DEFAULT, *KNOBS}
         assert {s.knob for s in settings if s.physics} == {"undrained", "dry", "elastic", "fixed"}
         assert [s.spacing for s in settings if s.knob == DEFAULT] == [0.8, 0.6, 0.4, 0.3]
         for knob, level in COMBINATIONS:
-            assert sorted(s.spacing for s in settings if (s.knob, s.level) == (knob, level)) == [0.4, 0.6, 0.8]
-        assert len({s.key for s in settings}) == len(settings)
+            ladder_of_it = [s for s in settings if (s.knob, s.level) == (knob, level) and not s.refined]
+            assert sorted(s.spacing for s in ladder_of_it) == [0.4, 0.6, 0.8]
+        for settings_of_a_role in ([s for s in settings if s.refined], [s for s in settings if not s.refined]):
+            assert len({s.key for s in settings_of_a_role}) == len(settings_of_a_role)
+
+    @pytest.mark.parametrize(("quick", "at", "coarser"), [(True, 0.6, 0.8), (False, 0.3, 0.6)])
+    def test_refines_what_a_ladder_shares_one_by_one_and_at_once(
+        self, scene: Scenario, quick: bool, at: float, coarser: float
+    ) -> None:
+        settings = plan(scene, quick=quick)
+        refined = [s for s in settings if s.refined]
+        assert {(s.knob, s.level) for s in refined if s.spacing == at} == {
+            ("courant_number", 0.475),
+            ("transfer_damping", 0.1),
+            ("pressure_relaxation", 0.1),
+            ("bulk_viscosity", 0.1),
+            ("density_correction", 0.5),
+            ("points_per_cell", 9),
+            ("record_interval", 0.005),
+            (EVERYTHING, None),
+        }
+        assert [(s.knob, s.spacing) for s in refined if s.spacing != at] == [(EVERYTHING, coarser)]
+        assert {at, coarser} <= {s.spacing for s in settings if s.knob == DEFAULT}
+        whole = next(s.scenario for s in refined if s.knob == EVERYTHING)
+        numerics, plain = whole.numerics, scene.numerics
+        for name in ("courant_number", "transfer_damping", "pressure_relaxation", "bulk_viscosity"):
+            assert getattr(numerics, name) == 0.5 * getattr(plain, name)
+        assert (numerics.points_per_cell, whole.output.time_series_interval_s) == (9, 0.005)
+
+    @pytest.mark.parametrize(
+        ("changes", "there", "not_there"),
+        [
+            ({"numerics.transfer": "flip"}, {"pic_share"}, {"transfer_damping"}),
+            ({"numerics.transfer": "apic"}, set(), {"pic_share", "transfer_damping"}),
+            ({"numerics.bulk_viscosity": 0.0}, {"transfer_damping"}, {"bulk_viscosity"}),
+            ({"numerics.points_per_cell": 16}, {"courant_number"}, {"points_per_cell"}),
+            ({"numerics.volumetric_smoothing": False}, {"courant_number"}, {"density_correction"}),
+        ],
+    )
+    def test_refines_only_what_the_scene_uses(
+        self, scene: Scenario, changes: dict[str, Any], there: set[str], not_there: set[str]
+    ) -> None:
+        found = {s.knob for s in known_ladder(scene.replaced(changes), [0.8, 0.6, 0.4]) if s.refined}
+        assert there <= found
+        assert not not_there & found
 
     def test_full_study_holds_what_the_quick_one_says(self, scene: Scenario) -> None:
         quick, full = plan(scene, quick=True), plan(scene, quick=False)
@@ -202,12 +253,25 @@ class TestKeys:
         assert code_text(group, schema=True) != code_text(group.replace("2 *", "3 *"), schema=True)
 
     def test_ladder_whose_figures_were_made_by_other_rules_is_not_used(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        assert purchase.shipped_ladders(), (
+        assert shipped.shipped_scenes(), (
             "The rules that make figures have changed: python -m warp_mpm accuracy scenarios/*.json "
             "--data warp_mpm/accuracy/paper_scenes.json"
         )
-        monkeypatch.setattr(purchase, "rules_digest", lambda: "other")
-        assert not purchase.shipped_ladders()
+        monkeypatch.setattr(shipped, "rules_digest", lambda: "other")
+        assert not shipped.shipped_scenes()
+
+
+class TestMeasure:
+    def test_denser_records_are_judged_like_others(self) -> None:
+        """Forces as means over 10 ms, all else as it is at their ends; the last stretch may be shorter."""
+        time = np.array([0.0, 0.005, 0.01, 0.015, 0.02, 0.022])
+        series = {"time": time, "impact_force_x": np.array([0.0, 2.0, 4.0, 8.0, 0.0, 5.0]), "place": 10.0 * time}
+        judged = judged_series(series)
+        assert judged["time"].tolist() == [0.0, 0.01, 0.02, 0.022]
+        assert judged["impact_force_x"] == pytest.approx([0.0, 3.0, 4.0, 5.0])
+        assert judged["place"] == pytest.approx([0.0, 0.1, 0.2, 0.22])
+        coarse = {"time": np.array([0.0, 0.01, 0.02]), "impact_force_x": np.array([0.0, 3.0, 4.0])}
+        assert judged_series(coarse) is coarse
 
 
 class TestVerdict:
@@ -322,10 +386,174 @@ class TestVerdict:
         study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
         lines = csv_table(study).splitlines()
         assert len(lines) == 1 + sum(not s.physics for s in settings)
+        assert sum("everything refined" in line for line in lines) == 2
         assert len({len(re.findall(r',(?=(?:[^"]*"[^"]*")*[^"]*$)', line)) for line in lines}) == 1
 
 
+@pytest.fixture(scope="module")
+def settings(scene: Scenario) -> list[Setting]:
+    return plan(scene, quick=True)
+
+
+@pytest.fixture(scope="module")
+def study(scene: Scenario, settings: list[Setting]) -> Study:
+    """Of a scene in which Courant number and relaxation move everything by 2 % each, at every spacing alike."""
+    return evaluate(scene, settings, {s.key: made_up(s.scenario, shared=0.02) for s in settings})
+
+
+class TestBudget:
+    def test_ladder_cannot_see_what_its_runs_share_and_the_budget_does(
+        self, scene: Scenario, settings: list[Setting], study: Study
+    ) -> None:
+        results = {s.key: made_up(s.scenario, shared=0.02) for s in settings}
+        alone = references(scene, [s for s in settings if s.knob == DEFAULT], results)
+        truth = 4e5  # where spacing, time step and relaxation go to nought
+        off = abs(alone.scalars["peak_force"].value - truth) / truth
+        assert off == pytest.approx(0.04, abs=2e-3)
+        assert alone.uncertainty("peak_force") == pytest.approx(alone.budget.spacing["peak_force"])
+        known = study.references.budget
+        # Half of 2 % each, relative to a reference that is 4 % too high.
+        part = 0.01 / 1.04
+        for setting in ("courant_number", "pressure_relaxation"):
+            assert known.settings[setting]["peak_force"] == pytest.approx(-part, rel=1e-2)
+        assert known.settings["bulk_viscosity"]["peak_force"] == pytest.approx(0.0, abs=1e-12)
+        # Both at once: twice one of them, more than the root of the squares. And what does not fall with the spacing
+        # goes on as it began, when the settings go on to nought.
+        assert known.change("peak_force") == pytest.approx(2.0 * part, rel=1e-2)
+        assert not known.falls("peak_force")
+        assert known.shared("peak_force") == pytest.approx(4.0 * part, rel=1e-2) == pytest.approx(off / 1.04, rel=0.05)
+        assert study.doubt("peak_force") == pytest.approx(math.hypot(known.spacing["peak_force"], 4.0 * part), rel=1e-2)
+
+    def test_parts_are_joined_as_squares_where_they_do_not_add_up(self) -> None:
+        parts = {"courant_number": {"impulse": 0.03}, "bulk_viscosity": {"impulse": -0.04}}
+        budget = Budget({"impulse": 0.12}, parts, {0.2: {"impulse": -0.01}, 0.4: {"impulse": 0.5}}, 0.2)
+        assert budget.shared("impulse") == pytest.approx(0.05)
+        assert budget.total("impulse") == pytest.approx(0.13)
+        assert budget.greatest("impulse") == "spacing"
+        assert replace(budget, spacing={"impulse": 0.01}).greatest("impulse") == "bulk viscosity"
+
+    @pytest.mark.parametrize(
+        ("fine", "coarse", "counted"),
+        [(0.06, 0.12, 0.06), (0.06, -0.09, 0.06), (0.06, 0.08, 0.12), (0.06, 0.0, 0.12), (0.01, 0.0, 0.1)],
+    )
+    def test_effect_that_is_not_seen_to_fall_counts_twice(self, fine: float, coarse: float, counted: float) -> None:
+        """It falls where twice the spacing has at least 1.41 times of it."""
+        parts = {"courant_number": {"impulse": 0.03}, "bulk_viscosity": {"impulse": -0.04}}
+        budget = Budget({"impulse": 0.0}, parts, {0.2: {"impulse": fine}, 0.4: {"impulse": coarse}}, 0.2)
+        assert budget.shared("impulse") == pytest.approx(counted)
+        assert not replace(budget, together={0.2: {"impulse": fine}}).falls("impulse")
+
+    def test_settings_that_only_together_are_off_are_told_so(self) -> None:
+        budget = Budget({"impulse": 0.01}, {"courant_number": {"impulse": 0.01}}, {0.2: {"impulse": 0.05}}, 0.2)
+        assert budget.greatest("impulse") == "all settings at once"
+        assert replace(budget, together={}).greatest("impulse") == "time step"
+
+    def test_nothing_is_sold_finer_than_settings_let_it_be_known(self, scene: Scenario) -> None:
+        settings = plan(scene, quick=False)
+        fine = evaluate(scene, settings, {s.key: made_up(s.scenario, order=1.5, shared=0.01) for s in settings})
+        assert fine.references.budget.spacing["impulse"] < 0.005  # 1.25 times 0.1 times 0.1^1.5, were it only that
+        assert fine.references.budget.shared("impulse") == pytest.approx(0.02, rel=0.03)
+        assert fine.price("impulse", 0.015) is None
+        assert fine.price("impulse", 0.03) is not None
+        said = " ".join(sentences(fine))
+        assert "was not seen to fall with the spacing, so counts twice" in said
+
+    def test_table_tells_every_part(self, study: Study) -> None:
+        text = "\n".join(budget_table(study))
+        causes = ("spacing", "time step", "rate β of the transfer", "pressure relaxation", "bulk viscosity")
+        for cause in (*causes, "density correction", "points per cell", "record interval", "**known to**"):
+            assert text.count(f"\n| {cause} |") == 1
+        assert text.count("\n| all settings at once | the same, at ") == 2
+        assert "| time step | 0.475 | -0.96% | -0.96% |" in text
+        assert f"**± {study.doubt('peak_force'):.2%}**" in text
+        assert text in markdown(study, [])
+
+    def test_setting_whose_refined_run_diverged_is_told(self, scene: Scenario, settings: list[Setting]) -> None:
+        results = {s.key: made_up(s.scenario, shared=0.02) for s in settings}
+        lost = next(s for s in settings if s.refined and s.knob == "bulk_viscosity")
+        results[lost.key] |= {"status": "diverged", "problem": "it did", "figures": {}, "curves": {}}
+        study = evaluate(scene, settings, results)
+        assert "bulk viscosity refined the run diverged" in " ".join(sentences(study))
+        assert "Diverged when refined, so not in the table: bulk_viscosity" in markdown(study, [])
+
+    def test_ladder_alone_says_that_its_uncertainty_is_the_spacing_s(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario) for s in settings})
+        assert "the uncertainty is the spacing's alone" in " ".join(sentences(study))
+
+    def test_greatest_pore_pressure_is_told_not_to_converge(self, study: Study) -> None:
+        assert study.price("pore_pressure_max", 0.1) is None
+        assert not [said for said in sentences(study) if "pore pressure" in said]
+        line = next(line for line in markdown(study, []).splitlines() if "(does not converge)" in line)
+        assert [cell.strip() for cell in line.split("|")[3:9]] == ["–", line.split("|")[4].strip(), *["–"] * 4]
+
+
+class TestSlopes:
+    def test_order_of_the_error_and_its_cost(self, scene: Scenario) -> None:
+        """Time goes with the cube of the spacing."""
+        for order in (0.8, 1.5):
+            settings = ladder(scene, [0.8, 0.4, 0.2, 0.1, 0.05])
+            study = evaluate(scene, settings, {s.key: made_up(s.scenario, order=order) for s in settings})
+            slope = study.slopes["peak_force"]
+            assert slope.spacing == pytest.approx(order, rel=0.05)
+            assert slope.cost == pytest.approx(order / 3.0, rel=0.05)
+            assert str(slope) == f"error ~ cost^-{slope.cost:.2g}, ~ spacing^{slope.spacing:.2g}"
+
+    def test_errors_within_the_doubt_show_no_order(self, scene: Scenario) -> None:
+        settings = ladder(scene, [0.8, 0.6, 0.4, 0.3])
+        shift = {0.8: 0.0, 0.6: 0.1, 0.4: -0.1, 0.3: 0.05}
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=shift[s.spacing]) for s in settings}
+        slope = evaluate(scene, settings, results).slopes["impulse"]
+        assert (slope.cost, slope.spacing) == (None, None)
+        assert str(slope) == "no order seen"
+
+    def test_order_of_the_spacing_is_seen_though_the_settings_hide_the_truth(self, scene: Scenario) -> None:
+        settings = known_ladder(scene, [0.8, 0.4, 0.2, 0.1, 0.05])
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario, order=1.2, shared=0.05) for s in settings})
+        assert study.doubt("impulse") > 0.08 > max(row.errors["impulse"] for row in study.rows)
+        assert study.slopes["impulse"].spacing == pytest.approx(1.2, rel=0.05)
+
+    def test_errors_that_jump_show_no_order(self, scene: Scenario) -> None:
+        spacings = [0.8, 0.6, 0.4, 0.3, 0.1, 0.05]
+        shift = dict(zip(spacings, (0.9, 0.1, 0.5, 0.01, 0.0, 0.0), strict=True))
+        settings = ladder(scene, spacings)
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=shift[s.spacing]) for s in settings}
+        study = evaluate(scene, settings, results)
+        assert sum(row.errors["impulse"] > study.doubt("impulse") for row in study.rows) >= 3
+        assert study.slopes["impulse"].spacing is None
+
+    def test_what_lies_below_the_doubt_bends_nothing(self, scene: Scenario) -> None:
+        off = {1.6: 0.8, 0.8: 0.4, 0.4: 0.2, 0.2: 0.001, 0.1: 0.0, 0.05: 0.02}
+        settings = ladder(scene, list(off))
+        results = {s.key: made_up(s.scenario, order=0.0, wobble=off[s.spacing]) for s in settings}
+        study = evaluate(scene, settings, results)
+        rows = [row for row in study.rows if row.setting.spacing in (1.6, 0.8, 0.4)]
+        assert all(abs(row.errors["impulse"]) > study.doubt("impulse") for row in rows)
+        assert any(abs(row.errors["impulse"]) < study.doubt("impulse") for row in study.rows)
+        spacings, wrong = np.log([[row.setting.spacing, row.errors["impulse"]] for row in rows]).T
+        assert study.slopes["impulse"].spacing == pytest.approx(np.polyfit(spacings, wrong, 1)[0])
+
+
 class TestPictures:
+    def test_panels_tell_how_the_error_falls_and_where_the_floor_is(self, scene: Scenario) -> None:
+        settings = known_ladder(scene, [0.8, 0.4, 0.2, 0.1])
+        study = evaluate(scene, settings, {s.key: made_up(s.scenario, order=1.5, shared=0.001) for s in settings})
+        figure = error_against_cost([study, study, study])
+        drawn_panels = [panel for panel in figure.axes if panel.axison]
+        assert len(drawn_panels) == 3
+        for panel in drawn_panels:
+            assert str(study.slopes["overall"]) in panel.get_title()
+            assert "cost^-" in panel.get_title()
+            assert "slope along the spacings" in panel.get_legend_handles_labels()[1]
+            floors = [floor.get_y() + floor.get_height() for floor in panel.patches]
+            assert floors == pytest.approx([study.doubt("overall"), study.spacing_doubt("overall")])
+        titles = [panel.get_title() for panel in error_against_time(study, []).axes if panel.axison]
+        assert all("cost^-" in title for title in titles[:3])
+        for panel in error_against_time(study, []).axes[:3]:
+            (line,) = [line for line in panel.lines if line.get_label() == "slope along the spacings"]
+            time, error = np.log(line.get_xdata()), np.log(line.get_ydata())
+            assert -np.polyfit(time, error, 1)[0] == pytest.approx(study.slopes["peak_force"].cost, rel=0.05)
+
     def test_settings_and_spacings_are_told_apart(self, scene: Scenario) -> None:
         settings = plan(scene, quick=False)
         random = np.random.default_rng(3)
@@ -375,32 +603,32 @@ class TestPurchase:
     )
 
     def test_keeps_the_promise_on_a_law(self) -> None:
-        offer = choose(self.LADDER, self.SOLD, taken, accuracy=0.02)
+        offer = choose(self.LADDER, self.SOLD, taken, shared={}, accuracy=0.02)
         assert 0.2 * offer.spacing <= 0.02
         # 1.25 for safety: no finer than that asks for, but for whole rows of cells.
         assert 0.2 * offer.spacing * 1.25 == pytest.approx(0.02, rel=0.03)
         assert offer.values["peak_force"] == pytest.approx(4e5)
 
     def test_fills_the_budget(self) -> None:
-        offer = choose(self.LADDER, self.SOLD, taken, budget=60.0)
+        offer = choose(self.LADDER, self.SOLD, taken, shared={}, budget=60.0)
         assert 55.0 < offer.time <= 60.0
-        slower = choose(self.LADDER, self.SOLD, lambda spacing: 2.0 * taken(spacing), budget=60.0)
+        slower = choose(self.LADDER, self.SOLD, lambda spacing: 2.0 * taken(spacing), shared={}, budget=60.0)
         assert slower.spacing > offer.spacing
 
     def test_a_flow_that_never_arrives_has_no_figures(self) -> None:
         """As a scene without a barrier, of which alone the sentence spoke."""
         silent = [Rung(rung.spacing, rung.time, dict.fromkeys(rung.figures, 0.0)) for rung in self.LADDER]
         with pytest.raises(PurchaseError, match="In none of the probes did the flow reach a barrier"):
-            choose(silent, self.SOLD, taken, budget=60.0)
+            choose(silent, self.SOLD, taken, shared={}, budget=60.0)
 
     def test_says_what_can_be_had(self) -> None:
         # 1.25 times 0.2 times 3 m / 120.
         with pytest.raises(
             PurchaseError, match=r"--accuracy 0\.1% .* best on offer is 0\.63% at a spacing of 0\.025 m"
         ):
-            choose(self.LADDER, self.SOLD, taken, accuracy=0.001)
+            choose(self.LADDER, self.SOLD, taken, shared={}, accuracy=0.001)
         with pytest.raises(PurchaseError, match=r"coarsest spacing sold, 0\.5 m"):
-            choose(self.LADDER, self.SOLD, taken, budget=1.0)
+            choose(self.LADDER, self.SOLD, taken, shared={}, budget=1.0)
 
     @pytest.mark.parametrize(
         ("accuracy", "rows"),
@@ -408,17 +636,17 @@ class TestPurchase:
         [(0.06, 6), (0.05, 6), (0.049, 8), (0.03, 8)],
     )
     def test_ladder_that_wobbles_promises_what_was_seen(self, accuracy: float, rows: int) -> None:
-        offer = choose(self.WOBBLE, self.SOLD, taken, accuracy=accuracy + 1e-9)
+        offer = choose(self.WOBBLE, self.SOLD, taken, shared={}, accuracy=accuracy + 1e-9)
         assert offer.spacing == 3.0 / rows
         assert offer.values["peak_force"] == 4e5
 
     def test_coarse_run_that_is_right_by_accident_promises_nothing(self) -> None:
         lucky = Rung(0.6, 0.1, {"peak_force": 4e5, "impulse": 1e6})
-        assert choose([lucky, *self.WOBBLE], (*self.SOLD, 0.6), taken, accuracy=0.04).spacing == 3.0 / 8
+        assert choose([lucky, *self.WOBBLE], (*self.SOLD, 0.6), taken, shared={}, accuracy=0.04).spacing == 3.0 / 8
 
     def test_three_runs_are_no_law(self) -> None:
         """Three points lie on a line by accident: what was seen is promised, no less."""
-        offer = choose(self.LADDER[1:], self.SOLD, taken, budget=3600.0)
+        offer = choose(self.LADDER[1:], self.SOLD, taken, shared={}, budget=3600.0)
         force = [rung.figures["peak_force"] for rung in self.LADDER[1:]]
         assert offer.errors["peak_force"] == pytest.approx((max(force) - min(force)) / force[-1])
         assert offer.values["peak_force"] == force[-1]
@@ -426,13 +654,13 @@ class TestPurchase:
     def test_figure_that_is_nought_is_no_figure(self) -> None:
         """A barrier that could slide and does not."""
         rungs = [replace(r, figures=r.figures | {"barrier_displacement_final": 0.0}) for r in self.LADDER]
-        offer = choose(rungs, self.SOLD, taken, accuracy=0.05)
+        offer = choose(rungs, self.SOLD, taken, shared={}, accuracy=0.05)
         assert set(offer.errors) == {"peak_force", "impulse"}
 
     def test_no_spacing_finer_than_was_run_is_promised_to_wobble_less(self) -> None:
         with pytest.raises(PurchaseError, match=r"best on offer is 3(\.1)?% at a spacing of 0\.375 m"):
-            choose(self.WOBBLE, self.SOLD, taken, accuracy=0.029)
-        assert choose(self.WOBBLE, self.SOLD, taken, budget=3600.0).error == pytest.approx(0.03)
+            choose(self.WOBBLE, self.SOLD, taken, shared={}, accuracy=0.029)
+        assert choose(self.WOBBLE, self.SOLD, taken, shared={}, budget=3600.0).error == pytest.approx(0.03)
 
     @pytest.mark.parametrize(("height", "crest_on_line"), [(6.0, True), (5.0, True), (1.0, False)])
     def test_spacings_meet_the_crest(self, scene: Scenario, height: float, crest_on_line: bool) -> None:
@@ -459,6 +687,27 @@ class TestPurchase:
         force = np.sin(7.0 * time)
         halves = 0.5 * (force[1::2] + force[2::2])
         assert peak_mean(time, force, 0.01) == pytest.approx(halves.max(), rel=1e-12)
+
+    def test_what_settings_do_at_every_spacing_counts_in_each_promise(self) -> None:
+        shared = {"peak_force": 0.03, "impulse": 0.001}
+        plain = choose(self.LADDER, self.SOLD, taken, shared={}, budget=60.0)
+        offer = choose(self.LADDER, self.SOLD, taken, shared=shared, budget=60.0)
+        assert offer.spacing == plain.spacing
+        for name, error in plain.errors.items():
+            assert offer.errors[name] == pytest.approx(math.hypot(error, shared[name]))
+        asked = choose(self.LADDER, self.SOLD, taken, shared=shared, accuracy=0.05)
+        assert math.hypot(0.2 * 1.25 * asked.spacing, 0.03) == pytest.approx(0.05, rel=0.03)
+
+    def test_accuracy_finer_than_settings_let_be_known_is_refused_with_the_reason(self) -> None:
+        with pytest.raises(PurchaseError) as error:
+            choose(self.LADDER, self.SOLD, taken, shared={"peak_force": 0.03}, accuracy=0.02)
+        assert str(error.value).startswith(
+            "--accuracy 2% cannot be promised for this scene: the best on offer is 3.1% "
+        )
+        assert (
+            "It is the peak force, 10 ms mean that changes by 3% when the time step, the filters and the points are "
+            "refined, which no spacing takes away; ask for --accuracy 3.1%"
+        ) in str(error.value)
 
 
 class TestCheck:
@@ -502,13 +751,61 @@ class TestCheck:
             "not the time",
         ]
 
+    GOT = Got("a scene", 0.4, "5%", 0.04, 4.0, 5.0, {"peak_force": 4.2e5, "impulse": 1.01e6})
+
+    def test_truth_is_refined_in_everything(self, scene: Scenario) -> None:
+        truth = truth_of(scene, 0.25)
+        assert truth.spacing == pytest.approx(0.125)
+        assert truth_of(scene, 0.5).spacing == pytest.approx(3.0 / 18.0, rel=0.02)
+        assert truth.scenario.numerics == refined_everything(scene, truth.spacing).scenario.numerics
+        assert truth.scenario.numerics.courant_number == 0.475
+        assert truth.scenario.numerics.points_per_cell == 9
+
+    def test_promise_is_held_against_the_truth(self, scene: Scenario) -> None:
+        truth = truth_of(scene, 0.4)
+        one = self.GOT.held_against(truth, {"status": "finished", "figures": {"peak_force": 4e5, "impulse": 1e6}})
+        assert (one.true_error, one.worst) == (pytest.approx(0.05), "peak force")
+        assert one.true_spacing == truth.spacing
+        assert (one.error_holds, one.time_holds) == (True, True)
+        with pytest.raises(ValueError, match="finer run of the scene a scene failed: it did"):
+            self.GOT.held_against(truth, {"status": "diverged", "problem": "it did", "figures": {}})
+
+    def test_buys_and_runs_the_truth_once(
+        self, scene: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The second time all is read, what was bought and what is true."""
+        bought: list[float | None] = []
+
+        def got(scene: Scenario, budget: float | None) -> Got:
+            bought.append(budget)
+            figures = measure(scene.replaced({"numerics.spacing_m": 1.0}))["figures"]
+            names = ("peak_force", "impulse")
+            return Got(scene.title, 1.0, "5%", 0.5, 4.0, 5.0, {name: figures[name] for name in names})
+
+        monkeypatch.setattr(checking, "_got", got)
+        monkeypatch.setattr(checking, "TRUE_CELLS", 4.0)
+        scenes = [scene.replaced({"output.end_time_s": 0.5, "title": title}) for title in ("first", "second")]
+        scenes[1] = scenes[1].replaced({"barrier.motion": {"kind": "fixed"}})
+        said: list[str] = []
+        first = check(scenes, tmp_path, on_progress=said.append)
+        assert [one.scene for one in first] == ["first", "second"]
+        assert bought == [None, checking.BUDGET]
+        assert all(one.true_spacing == pytest.approx(0.5) and one.true_error > 0.0 for one in first)
+        assert any("promised 50.0% in 4 s, run in 5 s" in line for line in said)
+        assert "finer runs: 2 done, 0 running, 0 left" in said
+        said.clear()
+        assert check(scenes, tmp_path, on_progress=said.append) == first
+        assert len(bought) == 2
+        assert not any("1 running" in line for line in said)
+
 
 class TestRunner:
     def test_runs_once_and_goes_on_where_it_stopped(self, scene: Scenario, tmp_path: Path) -> None:
         short = scene.replaced({"output.end_time_s": 0.05, "numerics.spacing_m": 0.8})
         settings = ladder(short, [1.0, 0.8])
         seen: list[StudyProgress] = []
-        first = run_settings(settings, tmp_path, jobs=1, on_progress=seen.append)
+        twice = [*settings, replace(settings[0], refined=True)]  # a choice that is also looked at for the reference
+        first = run_settings(twice, tmp_path, jobs=1, on_progress=seen.append)
         assert (seen[-1].done, seen[-1].left) == (2, 0)
         assert all(p.done + len(p.running) + p.left == 2 for p in seen)
         (tmp_path / f"{settings[0].key}.json").unlink()
@@ -524,7 +821,8 @@ class TestRunner:
         assert run_settings([setting], tmp_path, jobs=1)[setting.key]["figures"]
 
     def test_measure_tells_figures_curves_and_times(self, scene: Scenario) -> None:
-        result = measure(scene.replaced({"output.end_time_s": 0.5, "numerics.spacing_m": 0.8}), profile=True)
+        (setting,) = ladder(scene.replaced({"output.end_time_s": 0.5}), [0.8])
+        result = measure(setting.scenario, profile=True)
         assert result["status"] == "finished"
         assert (
             result["figures"]["barrier_displacement_final"] == result["curves"]["barrier_displacement"][-1]
@@ -533,4 +831,7 @@ class TestRunner:
         )
         assert sum(result["kernel_times"].values()) == pytest.approx(1.0)
         assert result["cpu_time"] > 0.0
+        dense = measure(setting.scenario.replaced({"output.time_series_interval_s": 0.005}))
+        assert dense["curves"]["time"] == pytest.approx(result["curves"]["time"])
+        assert dense["samples"] == 2 * result["samples"] - 1
         json.dumps(result)

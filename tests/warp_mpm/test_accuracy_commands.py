@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from warp_mpm.accuracy import purchase
+from warp_mpm.accuracy import purchase, runner, shipped
 from warp_mpm.accuracy.keys import scene_key
 from warp_mpm.accuracy.report import put_into_page
 from warp_mpm.cli import app
+from warp_mpm.engine import Ended, Task
 from warp_mpm.scenario import Scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+class Here:
+    """An engine without processes, whose start takes longer than what many a test runs in them."""
+
+    def __init__(self, at_once: int):
+        pass
+
+    def run(self, tasks: Sequence[Task], *, on_start: Callable[[Task], None]) -> Iterator[Ended]:
+        for task in tasks:
+            on_start(task)
+            yield Ended(task, task.function(*task.arguments))
 
 
 @pytest.fixture
@@ -58,7 +72,10 @@ def test_buys_runs_and_settles(coarse: Path, tmp_path: Path, monkeypatch: pytest
     assert f"Chosen: spacing {chosen:g} m" in result.stderr
 
 
-def test_ladders_of_several_scenes_and_their_data(coarse: Path, tmp_path: Path) -> None:
+def test_ladders_of_several_scenes_and_their_data(
+    coarse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "Processes", Here)
     fixed = tmp_path / "fixed.json"
     content = json.loads(coarse.read_text())
     content["barrier"]["motion"] = {"kind": "fixed"}
@@ -67,24 +84,43 @@ def test_ladders_of_several_scenes_and_their_data(coarse: Path, tmp_path: Path) 
     command = ["accuracy", str(coarse), str(fixed), "--quick", "--jobs", "1", "--out", str(out), "--data", str(data)]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.stderr
-    assert "8 done, 0 running, 0 left" in result.stderr
-    assert (out / "closed_form.png").stat().st_size > 10_000
+    # Four spacings each, seven settings refined at one of them, and all at once at two.
+    assert "26 done, 0 running, 0 left" in result.stderr
+    for picture in ("closed_form", "error_against_cost"):
+        assert (out / f"{picture}.png").stat().st_size > 10_000
     assert "closed form, paper's λ" in (out / "closed_form.md").read_text()
     scenes = json.loads(data.read_text())["scenes"]
     sliding = scenes[scene_key(Scenario.load(coarse))]
     assert [rung["spacing"] for rung in sliding["rungs"]] == [2.0, 1.6, 1.2, 0.8]
     assert sliding["rungs"][0]["figures"]["barrier_displacement_final"] > 0.0
+    assert set(sliding["shared"]) == {"peak_force", "impulse", "barrier_displacement_final"}
+    assert all(0.0 < change < 2.0 for change in sliding["shared"].values())
+    monkeypatch.setattr(shipped, "_data", lambda: json.loads(data.read_text()))
+    assert shipped.shipped_scenes()[scene_key(Scenario.load(coarse))].shared == sliding["shared"]
+    del scenes[scene_key(Scenario.load(coarse))]["shared"]
+    data_without = json.loads(data.read_text()) | {"scenes": scenes}
+    monkeypatch.setattr(shipped, "_data", lambda: data_without)
+    assert list(shipped.shipped_scenes()) == [scene_key(Scenario.load(fixed))]  # no promise rests on a ladder alone
     assert "barrier_displacement_final" not in scenes[scene_key(Scenario.load(fixed))]["rungs"][0]["figures"]
     # The same again: nothing is run.
     again = CliRunner().invoke(app, command)
     assert "running (" not in again.stderr
-    assert "8 done, 0 running, 0 left" in again.stderr
+    assert "26 done, 0 running, 0 left" in again.stderr
 
 
 def test_accuracy_refuses_a_folder_that_is_none(coarse: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["accuracy", str(coarse), "--data", str(tmp_path / "no" / "data.json")])
     assert result.exit_code == 2
     assert "must be a file in a folder that exists" in result.stderr
+
+
+def test_scene_without_a_barrier_is_refused_before_anything_runs(coarse: Path, tmp_path: Path) -> None:
+    coarse.write_text(json.dumps(json.loads(coarse.read_text()) | {"barrier": None}))
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["accuracy", str(coarse), "--out", str(out)])
+    assert result.exit_code == 2
+    assert "no barrier, so it has no key figures" in " ".join(result.stderr.split())
+    assert not out.exists()
 
 
 def test_result_goes_into_the_page_and_nothing_else_changes(tmp_path: Path) -> None:
@@ -119,6 +155,7 @@ def test_whole_study(coarse: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     assert "are beaten by" in result.stdout
     text = (out / "study.md").read_text()
+    assert "| **known to** | " in text
     for heading in ("What it says", "What each percent costs", "leaving an effect out", "price of the closed form"):
         assert f"## {heading}" in text or f"## The price of {heading}" in text or f"## The {heading}" in text
     for picture in ("error_against_time", "each_setting", "where_time_goes"):
@@ -128,10 +165,12 @@ def test_whole_study(coarse: Path, tmp_path: Path) -> None:
 def test_shipped_data_is_of_the_scenes_that_are_shipped() -> None:
     """A scenario that changes makes its data useless without a word; then it is to be measured anew."""
     known = {scene_key(Scenario.load(path)) for path in SCENARIOS.glob("*.json")}
-    shipped = purchase.shipped_ladders()
-    assert shipped
-    assert set(shipped) <= known
-    for rungs in shipped.values():
+    scenes = shipped.shipped_scenes()
+    assert scenes
+    assert set(scenes) <= known
+    for one in scenes.values():
+        rungs = one.rungs
         assert len(rungs) >= 3
+        assert {name for name in rungs[0].figures if rungs[0].figures[name]} <= set(one.shared)
         times = [rung.time for rung in sorted(rungs, key=lambda rung: -rung.spacing)]
         assert times == sorted(times)

@@ -12,10 +12,15 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.accuracy import kept as keeping
+from warp_mpm.accuracy import offer as offering
 from warp_mpm.accuracy import purchase
 from warp_mpm.accuracy.kept import Kept, cache_folder
+from warp_mpm.accuracy.keys import scene_key
+from warp_mpm.accuracy.offer import Offer, PurchaseError, Rung
 from warp_mpm.accuracy.pace import LONG_ENOUGH, points_of
-from warp_mpm.accuracy.purchase import Offer, PurchaseError, buy
+from warp_mpm.accuracy.purchase import buy
+from warp_mpm.accuracy.shipped import Known
+from warp_mpm.accuracy.study import refined_everything
 from warp_mpm.cli import app
 from warp_mpm.scenario import Scenario
 from warp_mpm.time_step import step_limits
@@ -28,10 +33,14 @@ class MadeUp:
 
     least_cost, around = 1e-8, 2.7
 
-    def __init__(self, *, speed: float = 1.0, compiling: float = 0.0, fails: tuple[float, ...] = ()):
-        self.now, self.compiling = 100.0, compiling
+    def __init__(
+        self, *, speed: float = 1.0, compiling: float = 0.0, fails: tuple[float, ...] = (), shared: float = 0.0
+    ):
+        self.now, self.compiling, self.shared = 100.0, compiling, shared
         self.ran: list[float] = []
         """Spacings of whole runs [m]."""
+        self.refined: list[float] = []
+        """Those of whole runs with more points to a cell [m]."""
         self.step, self.point = 4e-5 / speed, 1.2e-7 / speed
         self._fails = fails
 
@@ -58,9 +67,9 @@ class MadeUp:
         done, setup = min(1.0, limit / time), 1e-5 * points_of(scenario)
         if any(math.isclose(spacing, failing, rel_tol=0.05) for failing in self._fails):
             status = "diverged"
-        self.ran.append(spacing)
+        (self.refined if scenario.numerics.points_per_cell > 4 else self.ran).append(spacing)
         self.now += time * done + setup
-        off = 0.1 * spacing
+        off = 0.1 * spacing + self.shared * scenario.numerics.courant_number / 0.95
         return {
             "status": status,
             "problem": None if status == "finished" else f"{status}: a stress is not finite",
@@ -136,6 +145,8 @@ class TestTime:
         begun = bench.now
         buy(dry, accuracy=0.1, bench=bench)
         stepped = sum(bench.stepping(dry.replaced({"numerics.spacing_m": spacing})) for spacing in bench.ran)
+        (spacing,) = bench.refined
+        stepped += bench.stepping(refined_everything(dry, spacing).scenario)
         assert bench.now - begun - stepped >= 0.9 * LONG_ENOUGH
 
     def test_compiling_is_told_and_not_counted(self, dry: Scenario) -> None:
@@ -152,13 +163,58 @@ class TestTime:
         )
 
 
+@pytest.fixture
+def shipped(monkeypatch: pytest.MonkeyPatch) -> Scenario:
+    """A scene that was measured before, and what of it, where the program looks for that."""
+    scene = Scenario.load(SCENARIOS / "case_1.json")
+    rungs = [Rung(h, 0.1 / h**3, {"peak_force": 4e5 * (1 + 0.1 * h), "impulse": 1e6}) for h in (0.5, 0.4, 0.3, 0.2)]
+    known = {scene_key(scene): Known(rungs, {"peak_force": 0.03, "impulse": 0.002})}
+    monkeypatch.setattr(purchase, "shipped_scenes", lambda: known)
+    return scene
+
+
+class TestShared:
+    """What the settings do that all probes share is looked at, and no spacing takes it away."""
+
+    def test_is_probed_and_counts_in_what_is_promised(self, dry: Scenario) -> None:
+        plain = buy(dry, budget=20.0, bench=MadeUp())
+        offer = buy(dry, budget=20.0, bench=MadeUp(shared=0.04))
+        assert plain.spacing == offer.spacing
+        # Of 4 % half is left at half the Courant number, beside the 5 % of half a metre.
+        change = 0.02 / 1.09
+        for name, error in plain.errors.items():
+            assert offer.errors[name] == pytest.approx(math.hypot(error, change), rel=0.02)
+
+    def test_finer_accuracy_is_refused_with_the_reason(self, dry: Scenario) -> None:
+        with pytest.raises(PurchaseError, match=r"changes by 1\.8% when the time step, the filters and the points are"):
+            buy(dry, accuracy=0.01, bench=MadeUp(shared=0.04))
+        assert buy(dry, accuracy=0.01, bench=MadeUp(), agree=lambda what: True).error <= 0.01
+
+    def test_of_a_shipped_scene_it_is_shipped(self, shipped: Scenario) -> None:
+        bench = MadeUp()
+        offer = buy(shipped, budget=60.0, bench=bench)
+        assert bench.refined == []
+        assert offer.errors["peak_force"] > 0.03
+        with pytest.raises(PurchaseError, match="which no spacing takes away"):
+            buy(shipped, accuracy=0.03, bench=bench)
+
+    def test_refined_probe_that_fails(self, dry: Scenario) -> None:
+        class Delicate(MadeUp):
+            def measure(self, scenario: Scenario, limit: float) -> dict[str, Any]:
+                result = super().measure(scenario, limit)
+                return result | ({"status": "diverged", "problem": "it did"} if self.refined else {})
+
+        with pytest.raises(PurchaseError, match=r"The probe at 0\.5 m with all settings refined failed: it did"):
+            buy(dry, accuracy=0.1, bench=Delicate())
+
+
 class TestSettled:
     @pytest.mark.parametrize(("force", "warned"), [(4.0e5, False), (4.3e5, False), (4.5e5, True)])
     def test_says_where_the_run_is_not_what_was_expected(
         self, force: float, warned: bool, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         figures = {"peak_force": force, "impulse": 1e6, "wall_time": 3.0}
-        monkeypatch.setattr(purchase, "figures_of", lambda run: figures)
+        monkeypatch.setattr(offering, "figures_of", lambda run: figures)
         errors, values = {"peak_force": 0.05, "impulse": 0.01}, {"peak_force": 4e5, "impulse": 1e6}
         text = Offer(0.2, 5.0, 2.0, errors, values, "a probe", probing=1.0).settled(Path(), 6.5)
         assert "6.5 s of the processor and with probing 7.5 s in all, 1.2 times what was expected" in text
@@ -186,11 +242,12 @@ class TestBudgetThatIsShort:
 
     def test_fewer_and_coarser_probes(self, wet: Scenario) -> None:
         numbers = {}
-        for budget in (8.0, 11.0, 60.0):
+        for budget in (8.0, 14.0, 60.0):
             bench = MadeUp()
             buy(wet, budget=budget, bench=bench)
             numbers[budget] = sorted(round(wet.flow.depth / spacing) for spacing in bench.ran)
-        assert numbers == {8.0: [4, 6, 8], 11.0: [6, 8, 11], 60.0: [6, 8, 11, 15]}
+            assert bench.refined == [max(bench.ran)]
+        assert numbers == {8.0: [4, 6, 8], 14.0: [6, 8, 11], 60.0: [6, 8, 11, 15]}
 
     def test_probes_that_leave_no_time_are_kept(self, dry: Scenario, tmp_path: Path) -> None:
         """And the sentence says that only where it is so."""
@@ -218,10 +275,10 @@ class TestKept:
         assert another.ran == []
         assert offer.time == pytest.approx(30.0, rel=0.1)
 
-    def test_shipped_scene_is_timed_once(self, tmp_path: Path) -> None:
-        scene, bench = Scenario.load(SCENARIOS / "case_1.json"), MadeUp()
-        first = buy(scene, budget=30.0, bench=bench, kept=Kept.of(scene, "cpu", tmp_path))
-        second = buy(scene, budget=40.0, bench=bench, kept=Kept.of(scene, "cpu", tmp_path))
+    def test_shipped_scene_is_timed_once(self, shipped: Scenario, tmp_path: Path) -> None:
+        bench = MadeUp()
+        first = buy(shipped, budget=30.0, bench=bench, kept=Kept.of(shipped, "cpu", tmp_path))
+        second = buy(shipped, budget=40.0, bench=bench, kept=Kept.of(shipped, "cpu", tmp_path))
         assert len(bench.ran) == 1
         assert second.spacing < first.spacing
         assert "shipped" in first.source
@@ -311,9 +368,11 @@ class TestKept:
         assert [path.name for path in tmp_path.iterdir()] == ["kept.json"]
 
     @pytest.mark.parametrize(("courant_number", "runs"), [(0.95, 1), (0.5, 4)])
-    def test_shipped_ladder_serves_its_scene_at_the_default_settings(self, courant_number: float, runs: int) -> None:
-        scene, bench = Scenario.load(SCENARIOS / "case_1.json"), MadeUp()
-        offer = buy(scene.replaced({"numerics.courant_number": courant_number}), accuracy=0.2, bench=bench)
+    def test_shipped_ladder_serves_its_scene_at_the_default_settings(
+        self, shipped: Scenario, courant_number: float, runs: int
+    ) -> None:
+        bench = MadeUp()
+        offer = buy(shipped.replaced({"numerics.courant_number": courant_number}), accuracy=0.2, bench=bench)
         assert len(bench.ran) == runs
         assert ("shipped" in offer.source) == (runs == 1)
 

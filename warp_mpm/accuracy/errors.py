@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from warp_mpm.accuracy.budget import Budget
 from warp_mpm.accuracy.measure import smoothed_force
 from warp_mpm.accuracy.runner import Result
-from warp_mpm.accuracy.study import DEFAULT, Setting
+from warp_mpm.accuracy.study import DEFAULT, EVERYTHING, Setting
 from warp_mpm.quantities import Quantity
 from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.time_series import NAMED
@@ -33,6 +34,8 @@ class Judged:
     """What an error is relative to: `itself`, the name of another figure, or `volume` of the flow."""
     curve: str | None = None
     """Column of a curve; its error is the root mean square over the run, relative to the curve's greatest value."""
+    converges: bool = True
+    """Whether finer grids lead anywhere: the greatest value at any point and any sample grows with their number."""
 
     @property
     def label(self) -> str:
@@ -51,8 +54,8 @@ class Judged:
         return self.quantity.factor
 
 
-def _figure(name: str, note: str = "", scale: str = "itself") -> Judged:
-    return Judged(name, FIGURES[name], note, scale)
+def _figure(name: str, note: str = "", scale: str = "itself", *, converges: bool = True) -> Judged:
+    return Judged(name, FIGURES[name], note, scale, converges=converges)
 
 
 def _over_time(name: str, column: str, note: str = " over time") -> Judged:
@@ -69,7 +72,8 @@ QUANTITIES: Mapping[str, Judged] = {
         _figure("impact_duration"),
         _figure("barrier_displacement_final"),
         _figure("barrier_velocity_max"),
-        _figure("pore_pressure_max"),
+        *(_figure(name) for name in ("pressure_patch_max", "pore_pressure_patch_max") if name in FIGURES),
+        _figure("pore_pressure_max", " (does not converge)", converges=False),
         _figure("overtopped_volume", " (of the flow's)", scale="volume"),
         _over_time("force_curve", "impact_force_x", " over time, 50 ms mean"),
         _over_time("energy_curve", "flow_kinetic_energy"),
@@ -79,6 +83,9 @@ QUANTITIES: Mapping[str, Judged] = {
 
 KEY_QUANTITIES = ("peak_force", "impulse", "barrier_displacement_final")
 """What a design needs; their greatest error is the error of a setting as a whole."""
+
+TOLD = tuple(name for name in (*KEY_QUANTITIES, "pressure_patch_max") if name in QUANTITIES)
+"""Quantities of which a study tells what they cost, and what makes up their uncertainty."""
 
 SAFETY = 1.25
 """Factor on an extrapolation whose order of convergence was observed (Roache's grid convergence index)."""
@@ -144,18 +151,16 @@ class References:
     scalars: dict[str, Reference]
     curves: dict[str, Array]
     """Curves of the finest run, by the quantity's name."""
-    curve_uncertainty: dict[str, float]
-    """Relative difference of the two finest runs' curves."""
     scales: dict[str, float]
     """What an error of each quantity is relative to [SI]."""
     finest: Result
     """The run that is itself the reference where no order was observed."""
+    budget: Budget
+    """What makes up the uncertainty; the spacing's part of a curve is the distance of the two finest runs'."""
 
     def uncertainty(self, name: str) -> float:
-        """Relative uncertainty of a quantity's reference."""
-        if name in self.scalars:
-            return self.scalars[name].uncertainty / self.scales[name]
-        return self.curve_uncertainty[name]
+        """Relative uncertainty of a quantity's reference, of the spacing and of all that the ladder shares."""
+        return self.budget.total(name)
 
     @property
     def names(self) -> list[str]:
@@ -167,14 +172,22 @@ class References:
         """Those of `KEY_QUANTITIES` that the scene has."""
         return [name for name in KEY_QUANTITIES if name in self.scalars]
 
+    @property
+    def told_names(self) -> list[str]:
+        """Those of `TOLD` that the scene has."""
+        return [name for name in TOLD if name in self.scalars]
 
-def references(scenario: Scenario, ladder: Sequence[Setting], results: Mapping[str, Result]) -> References:
+
+def references(
+    scenario: Scenario, ladder: Sequence[Setting], results: Mapping[str, Result], refined: Sequence[Setting] = ()
+) -> References:
     """References from the ladder of a scene's own settings.
 
     Args:
         scenario: the scene.
         ladder: settings that differ in spacing only; those that diverged are left out.
         results: by the settings' keys.
+        refined: settings of which one, or all, are finer than the ladder's at one of its spacings.
 
     Raises:
         ValueError: fewer than three runs of the ladder came to their end.
@@ -208,7 +221,47 @@ def references(scenario: Scenario, ladder: Sequence[Setting], results: Mapping[s
             if np.abs(curve).max() > 0.0:
                 curves[name], scales[name] = curve, float(np.abs(curve).max())
                 doubt[name] = _distance(_curve(second, quantity), curve)
-    return References(scalars, curves, doubt, scales, finest)
+    doubt |= {name: reference.uncertainty / scales[name] for name, reference in scalars.items()}
+    budget = _budget(doubt, scales, ladder, refined, results)
+    return References(scalars, curves, scales, finest, budget)
+
+
+def _budget(
+    spacing: Mapping[str, float],
+    scales: Mapping[str, float],
+    ladder: Sequence[Setting],
+    refined: Sequence[Setting],
+    results: Mapping[str, Result],
+) -> Budget:
+    rungs = {setting.spacing: results[setting.key] for setting in ladder}
+    alone: dict[str, dict[str, float]] = {}
+    together: dict[float, dict[str, float]] = {}
+    lost = []
+    for setting in refined:
+        result, rung = results[setting.key], rungs[setting.spacing]
+        if rung["status"] != "finished":
+            continue
+        if result["status"] != "finished":
+            lost.append(setting.knob)
+        elif setting.knob == EVERYTHING:
+            together[setting.spacing] = _changes(result, rung, scales)
+        else:
+            alone[setting.knob] = _changes(result, rung, scales)
+    at = min((setting.spacing for setting in refined), default=None)
+    return Budget(spacing, alone, together, at, tuple(dict.fromkeys(lost)))
+
+
+def _changes(result: Result, other: Result, scales: Mapping[str, float]) -> dict[str, float]:
+    """What a run has otherwise than another, relative to the scales; of curves the root mean square."""
+    found = {}
+    for name, scale in scales.items():
+        quantity = QUANTITIES[name]
+        if quantity.curve is not None:
+            squares = (_curve(result, quantity) - _curve(other, quantity)) ** 2
+            found[name] = float(np.sqrt(np.mean(squares))) / scale
+        elif result["figures"].get(name) is not None and other["figures"].get(name) is not None:
+            found[name] = (result["figures"][name] - other["figures"][name]) / scale
+    return found
 
 
 def errors(result: Result, references: References) -> dict[str, float]:

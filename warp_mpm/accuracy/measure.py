@@ -8,15 +8,25 @@ from typing import Any
 
 import numpy as np
 
-from analytic.force_record import moving_mean
+from analytic.force_record import cumulative_impulse, moving_mean
 from warp_mpm import mechanism
 from warp_mpm.recording import Schedule, SeriesInMemory, record_until
 from warp_mpm.scenario import Scenario
 from warp_mpm.snapshot import snapshot_of
 from warp_mpm.summary import impact_figures
 
+SERIES_INTERVAL = 0.01
+"""Interval of the forces [s]: a peak force is the greatest mean over it, however densely a run is recorded."""
+
 CURVES = ("impact_force_x", "flow_kinetic_energy", "barrier_displacement")
 """Columns of the time series that are kept."""
+
+GREATEST = {
+    "pressure_patch_max": "pressure_patch",
+    "pore_pressure_patch_max": "pore_pressure_patch",
+    "pore_pressure_max": "pore_pressure_max",
+}
+"""Figures that are the greatest value of a column, where the scene has it."""
 
 PROFILED_TIME, STRETCHES = 0.02, 5
 """Simulated time [s] over which the kernels are timed one by one, after the run, and its parts."""
@@ -80,9 +90,10 @@ def measure(
     }
     if found["status"] == "finished":
         series = recorder.series()
-        found["figures"] = _figures(scenario, simulation, series)
+        judged = judged_series(series)
+        found["figures"] = _figures(scenario, simulation, series, judged)
         found["curves"] = {
-            name: [float(f"{value:.7g}") for value in series[name]] for name in ("time", *CURVES) if name in series
+            name: [float(f"{value:.7g}") for value in judged[name]] for name in ("time", *CURVES) if name in judged
         }
         if profile:
             found["kernel_times"] = _kernel_times(simulation)
@@ -110,14 +121,29 @@ class _Timed(SeriesInMemory):
         self._before = simulation.time, simulation.steps, time.process_time()
 
 
-def _figures(scenario: Scenario, simulation: Any, series: dict[str, Any]) -> dict[str, float | None]:
-    figures = dict(impact_figures(series["time"], series.get("impact_force_x")))
+def judged_series(series: dict[str, Any]) -> dict[str, Any]:
+    """A time series at the end of each `SERIES_INTERVAL`, forces as means over it; the series itself where it is no
+    denser. So runs that are recorded more densely have the same figures and curves, but for what recording changes."""
+    time = series["time"]
+    together = round(SERIES_INTERVAL / float(time[1] - time[0])) if len(time) > 1 else 1
+    if together <= 1:
+        return series
+    ends = np.unique([*range(0, len(time), together), len(time) - 1])
+    judged = {name: values[ends] for name, values in series.items()}
+    if "impact_force_x" in series:
+        impulse = cumulative_impulse(time, series["impact_force_x"])[ends]
+        judged["impact_force_x"] = np.append(series["impact_force_x"][0], np.diff(impulse) / np.diff(time[ends]))
+    return judged
+
+
+def _figures(
+    scenario: Scenario, simulation: Any, series: dict[str, Any], judged: dict[str, Any]
+) -> dict[str, float | None]:
+    figures = dict(impact_figures(judged["time"], judged.get("impact_force_x")))
     figures["kinetic_energy_lost"] = float(series["flow_kinetic_energy"][0] - series["flow_kinetic_energy"][-1])
-    for name in ("pore_pressure_max", "barrier_velocity"):
-        if name in series:
-            figures[name] = float(series[name].max())
+    figures |= {name: float(series[column].max()) for name, column in GREATEST.items() if column in series}
     moves = scenario.barrier is not None and scenario.barrier.motion.kind == "sliding"
-    figures["barrier_velocity_max"] = figures.pop("barrier_velocity", None) if moves else None
+    figures["barrier_velocity_max"] = float(series["barrier_velocity"].max()) if moves else None
     figures["barrier_displacement_final"] = float(series["barrier_displacement"][-1]) if moves else None
     return figures | mechanism.deposit(scenario, snapshot_of(simulation))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,21 +14,25 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from warp_mpm.accuracy.errors import QUANTITIES
+from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
 from warp_mpm.accuracy.study import DEFAULT, KNOBS, level_text
 from warp_mpm.accuracy.tables import formula_errors
-from warp_mpm.accuracy.verdict import Study, error_of
+from warp_mpm.accuracy.verdict import Study, error_of, sloping
 from warp_mpm.plotting.style import BLUE, GREY, ORANGE, RUN_COLOURS, grid
 
 LEAST_ERROR = 1e-4
 """Errors below are drawn here: less than any reference is known to."""
 
 SHOWN_BELOW_DOUBT = 5.0
-"""How far the panels go on below what the reference is known to; what is less is drawn on the lower edge."""
+"""How far the panels go on below what the spacing lets the reference be known to; what is less is drawn on the lower
+edge."""
 
 MARKERS = dict(zip((DEFAULT, *KNOBS), "osD^2v<>H1x", strict=True))
 """One for each knob: its points are told apart although there are fewer colours than knobs."""
+
+FLOOR, SPACING_FLOOR = "#EEEEEE", "#DADADA"
+"""Colours of errors that are below what the reference is known to, and below the spacing's part of that."""
 
 FORMULA_MARKERS = "*PXphd8"
 
@@ -39,12 +44,23 @@ LABEL_PLACES = (
 
 PANELS = (
     *("overall", "peak_force", "impulse", "barrier_displacement_final", "barrier_velocity_max", "impact_duration"),
-    *("peak_force_time", "pore_pressure_max", "overtopped_volume", "force_curve", "energy_curve", "displacement_curve"),
+    *(
+        "peak_force_time",
+        "pressure_patch_max",
+        "overtopped_volume",
+        "force_curve",
+        "energy_curve",
+        "displacement_curve",
+    ),
 )
 
 
 def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
-    """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left."""
+    """Error against time, one panel for each quantity, the cheapest choices joined, formulas at the left.
+
+    Above each panel stands how the error falls as the spacing does; a dashed line of that slope goes through the runs
+    from which it is told. Grey is what the reference is not known to, dark grey the spacing's part of that.
+    """
     names = [name for name in PANELS if name == "overall" or name in study.references.names]
     columns = 4
     rows = math.ceil(len(names) / columns)
@@ -69,7 +85,7 @@ def error_against_time(study: Study, found: Sequence[Formula]) -> Figure:
 
 def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula]) -> None:
     knobs = [DEFAULT, *(knob for knob in KNOBS if any(row.setting.knob == knob for row in study.rows))]
-    doubt, least = study.doubt(name), _least(study, name)
+    least = _least(study, name)
     for number, knob in enumerate(knobs):
         rows = [r for r in study.rows if r.setting.knob == knob and math.isfinite(error_of(r, name))]
         panel.plot(
@@ -86,6 +102,7 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
         [r.time for r in best], [_drawn(error_of(r, name), least) for r in best], "o-", color=GREY, linewidth=1.2,
         markersize=11, markerfacecolor="none", zorder=1, label="cheapest choices",
     )  # fmt: skip
+    _draw_slope(panel, study, name)
     for number, formula in enumerate(found):
         error = formula_errors(study, formula).get(name)
         if error is not None:
@@ -93,11 +110,28 @@ def _error_panel(panel: Axes, study: Study, name: str, found: Sequence[Formula])
                 formula.time, _drawn(abs(error), least), FORMULA_MARKERS[number % len(FORMULA_MARKERS)],
                 color=ORANGE if "closed form" in formula.name else GREY, markersize=8, label=formula.name,
             )  # fmt: skip
-    panel.axhspan(least / 2, max(doubt, least), color="#EEEEEE", zorder=0)
+    _draw_floor(panel, study, name)
     _logarithmic(panel, least)
-    panel.set_title(_title(name), fontsize=9)
+    panel.set_title(f"{_title(name)}\n{study.slopes[name]}", fontsize=9)
     panel.set_xlabel("CPU time", fontsize=8)
     panel.set_ylabel("error (grey: reference unsure)", fontsize=8)
+
+
+def _draw_slope(panel: Axes, study: Study, name: str) -> None:
+    """A line of the slope with which the error falls, through the runs from which it is told."""
+    power = study.slopes[name].cost
+    if power is None:
+        return
+    time, error = np.array([(row.time, error_of(row, name)) for row in sloping(study, name) if row.time > 0.0]).T
+    middle = np.exp(np.log(error).mean()) * (time / np.exp(np.log(time).mean())) ** -power
+    panel.plot(time, middle, "--", color="black", linewidth=1.2, zorder=3, label="slope along the spacings")
+
+
+def _draw_floor(panel: Axes, study: Study, name: str) -> None:
+    """What the reference is not known to, and in it, darker, the spacing's part."""
+    least = _least(study, name)
+    panel.axhspan(least / 2, max(study.doubt(name), least), color=FLOOR, zorder=-1)
+    panel.axhspan(least / 2, max(study.spacing_doubt(name), least), color=SPACING_FLOOR, zorder=0)
 
 
 def _name_spacings(panel: Axes, study: Study, name: str) -> None:
@@ -138,7 +172,7 @@ def error_of_each_knob(study: Study) -> Figure:
         panel.set_axis_off()
     ladder = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda r: r.setting.spacing)
     spacings = [row.setting.spacing for row in ladder]
-    for number, name in enumerate([*study.references.key_names, "pore_pressure_max", "energy_curve"]):
+    for number, name in enumerate([*study.references.told_names, "energy_curve"]):
         if name not in study.references.names:
             continue
         reference = study.references.scalars.get(name)
@@ -219,6 +253,42 @@ def where_time_goes(study: Study) -> Figure:
     return figure
 
 
+def error_against_cost(studies: Sequence[Study]) -> Figure:
+    """Error of each key figure against time along the ladder of spacings, a panel for each scene.
+
+    Above each panel stands how the worst of them falls. Grey is what its reference is not known to, dark grey the
+    spacing's part of that.
+    """
+    columns = min(4, len(studies))
+    rows = math.ceil(len(studies) / columns)
+    figure = Figure(figsize=(3.7 * columns + 0.4, 3.2 * rows + 0.7), layout="constrained")
+    figure.suptitle("Error of the key figures against CPU time (grey: reference unsure)", fontsize=12)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel in panels[len(studies) :]:
+        panel.set_axis_off()
+    handles: dict[str, Any] = {}
+    for panel, study in zip(panels, studies, strict=False):
+        own = sorted((r for r in study.rows if r.setting.knob == DEFAULT and r.errors), key=lambda row: row.time)
+        least = _least(study, "overall")
+        for number, name in enumerate(KEY_QUANTITIES):
+            if name in study.references.scalars:
+                panel.plot(
+                    [row.time for row in own], [_drawn(error_of(row, name), least) for row in own], "o-", markersize=4,
+                    color=RUN_COLOURS[number], linewidth=1.0, label=QUANTITIES[name].label,
+                )  # fmt: skip
+        _draw_slope(panel, study, "overall")
+        _draw_floor(panel, study, "overall")
+        _logarithmic(panel, least)
+        title = textwrap.fill(study.scenario.title, 52, max_lines=2)
+        panel.set_title(f"{title}\nthe worst: {study.slopes['overall']}", fontsize=8)
+        panel.set_xlabel("CPU time", fontsize=8)
+        panel.set_ylabel("error", fontsize=8)
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=4, fontsize=8)
+    return figure
+
+
 PRICED = ("peak_force", "impact_impulse", "impact_duration", "barrier_displacement_final")
 
 
@@ -264,7 +334,7 @@ def price_of_the_closed_form(studies: Sequence[tuple[Study, Sequence[Formula]]])
 
 def _least(study: Study, name: str) -> float:
     """The lower edge of a panel, on which lesser errors are drawn."""
-    return max(LEAST_ERROR, study.doubt(name) / SHOWN_BELOW_DOUBT)
+    return max(LEAST_ERROR, study.spacing_doubt(name) / SHOWN_BELOW_DOUBT)
 
 
 def _drawn(error: float, least: float = LEAST_ERROR) -> float:

@@ -11,7 +11,16 @@ from warp_mpm.accuracy.errors import QUANTITIES
 from warp_mpm.accuracy.formulas import formulas
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import Setting
-from warp_mpm.accuracy.tables import csv_table, effects_table, formula_errors, formulas_table, markdown, prices
+from warp_mpm.accuracy.tables import (
+    budget_table,
+    csv_table,
+    effects_table,
+    formula_errors,
+    formulas_table,
+    markdown,
+    prices,
+    scenes_table,
+)
 from warp_mpm.accuracy.verdict import Study, evaluate, sentences
 from warp_mpm.plotting.style import save
 from warp_mpm.scenario import Scenario
@@ -41,8 +50,10 @@ def study_block(scenario: Scenario, settings: Sequence[Setting], results: Mappin
         ValueError: as in `write_study`.
     """
     study, found = evaluate(scenario, settings, results), formulas(scenario)
-    spent = sum(row.result["cpu_time"] + row.result["recording_time"] for row in study.rows)
+    rows = [*study.rows, *study.refined]
+    spent = sum(row.result["cpu_time"] + row.result["recording_time"] for row in rows)
     lines = [f"{len(settings)} runs, {spent:.0f} s of one core without the effects left out.", "", *prices(study), ""]
+    lines += ["**Uncertainty budget.** " + budget_table(study)[0], *budget_table(study)[1:], ""]
     lines += ["What the program concludes from it:", "", *(f"- {said}" for said in sentences(study)), ""]
     if study.effects:
         lines += ["**Leaving an effect out.** " + effects_table(study)[0], *effects_table(study)[1:], ""]
@@ -89,7 +100,8 @@ def place_in(page: Path, name: str) -> tuple[str, str]:
 def write_ladders(
     folder: Path, scenes: Sequence[tuple[Scenario, Sequence[Setting]]], results: Mapping[str, Result]
 ) -> str:
-    """Write the price of the closed form over scenes: `closed_form.md` and `closed_form.png`; returns the table.
+    """Write what the scenes cost and the price of the closed form over them: `error_against_cost.png`,
+    `closed_form.md` and `closed_form.png`; returns the tables.
 
     Raises:
         ValueError: fewer than three spacings of a scene came to their end.
@@ -97,6 +109,7 @@ def write_ladders(
     studies = [(evaluate(scene, settings, results), formulas(scene)) for scene, settings in scenes]
     drawn = [(study, found) for study, found in studies if study.references.key_names]
     save(pictures.price_of_the_closed_form(drawn), folder / "closed_form.png")
+    save(pictures.error_against_cost([study for study, _ in drawn]), folder / "error_against_cost.png")
     lines = ["| scene | answer | time | " + " | ".join(QUANTITIES[n].label for n in pictures.PRICED) + " |"]
     lines += ["|---|---|---:|" + "---:|" * len(pictures.PRICED)]
     for study, found in drawn:
@@ -108,7 +121,7 @@ def write_ladders(
     table = "\n".join(lines) + "\n"
     about = "# The price of the closed form\n\nErrors against the converged simulation.\n\n"
     write_whole(folder / "closed_form.md", about + table)
-    return table
+    return "\n".join([*scenes_table([study for study, _ in drawn]), "", table])
 
 
 def _reference_line(study: Study) -> str:

@@ -64,7 +64,8 @@ def run_settings(
     folder.mkdir(parents=True, exist_ok=True)
     found = {key: result for key in {s.key for s in settings} if (result := _read(folder / f"{key}.json")) is not None}
     # The dearest first, so that no core waits for a long one at the end.
-    waiting = sorted((s for s in settings if s.key not in found), key=_cost, reverse=True)
+    missing = {setting.key: setting for setting in settings if setting.key not in found}
+    waiting = sorted(missing.values(), key=_cost, reverse=True)
     whole, started = sum(map(_cost, waiting)), time.perf_counter()
     spent, done = 0.0, len(found)
     on_progress(StudyProgress(done, (), len(waiting), None))

@@ -1,4 +1,5 @@
-"""Which settings a study of accuracy runs: a ladder of spacings, each knob alone, ladders of combinations, effects."""
+"""Which settings a study of accuracy runs: a ladder of spacings, each knob alone, ladders of combinations, effects, and
+what the reference's uncertainty is taken from: all that the ladder shares, refined."""
 
 from __future__ import annotations
 
@@ -7,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from warp_mpm.accuracy.keys import run_key
+from warp_mpm.accuracy.measure import SERIES_INTERVAL
 from warp_mpm.effect_rules import with_law, without_liquid
 from warp_mpm.scenario import DryFlow, Scenario, TwoPhaseFlow
-
-SERIES_INTERVAL = 0.01
-"""Interval of the forces [s]: a peak force is the greatest mean over it."""
+from warp_mpm.simulator.schemes import SCHEMES
 
 QUICK_SPACINGS, FULL_SPACINGS = (2.0, 1.5, 1.0, 0.75), (2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25)
 """Spacings of the ladders over the scenario's own."""
@@ -22,17 +22,34 @@ QUICK_LADDER, FULL_LADDER = (2.5, 2.0, 1.5, 1.0), (2.5, 2.0, 1.5, 1.0, 0.75, 0.5
 COMBINATION_SPACINGS = (2.0, 1.5, 1.0)
 """Spacings of the ladders with one other setting changed, over the scenario's own."""
 
-QUICK_KNOB_SPACING, FULL_KNOB_SPACING = 1.5, 1.0
+KNOB_SPACING = 1.5
 """Spacing over the scenario's own at which a knob is turned alone."""
 
+REFINED_SPACINGS, FULL_REFINED_SPACINGS = (2.0, 4.0), (3.0, 6.0)
+"""Spacings over the finest of the ladder, at the least, at which what the ladder shares is refined: at the first each
+setting alone and all at once, at the second all at once. The other pair is a full study's, whose finest runs are dear.
+"""
+
+HALVED = ("courant_number", "pressure_relaxation", "bulk_viscosity", "density_correction")
+"""Settings of `numerics` that a ladder of spacings shares, and that are refined by halving: the time step, filters."""
+
+LOSSES = ("transfer_damping", "pic_share")
+"""The same of the transfer schemes, each where the scheme in use has it."""
+
+POINTS = (1, 4, 9, 16)
+"""Points per cell that there are; the next number is the refined one."""
+
+INTERVAL, EVERYTHING = "record_interval", "everything"
+"""What is refined beside settings of `numerics`: the interval of records, which cut steps short, and all at once."""
+
 KNOBS: Mapping[str, tuple[Any, ...]] = {
-    "points_per_cell": (1, 4, 9, 16),
+    "points_per_cell": POINTS,
     "courant_number": (0.25, 0.5, 0.95),
     "transfer": ("aflip", "apic", "flip"),
     "transfer_damping": (0.1, 0.2, 0.4),
     "drag": ("semi_implicit", "explicit"),
     "volumetric_smoothing": (True, False),
-    "pressure_relaxation": (0.0, 1.0, 2.0),
+    "pressure_relaxation": (0.0, 0.2, 1.0),
     "bulk_viscosity": (0.0, 0.2, 0.4),
     "density_correction": (0.0, 1.0),
     "precision": ("float64", "float32"),
@@ -59,6 +76,8 @@ class Setting:
     scenario: Scenario
     physics: bool = False
     """True where an effect was left out: another question, not another way to answer it."""
+    refined: bool = False
+    """True where `knob` was refined to see what it does to the reference: no choice that is weighed against others."""
 
     @property
     def spacing(self) -> float:
@@ -72,7 +91,7 @@ class Setting:
 
 
 def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
-    """All runs of a study, none twice.
+    """All runs of a study, none twice; one that is refined may be a choice as well.
 
     Args:
         scenario: its numerics are the defaults around which the knobs are turned.
@@ -80,7 +99,10 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
     """
     own, base = scenario.numerics.spacing_m, _bare(scenario)
     settings = ladder(scenario, [own * factor for factor in (QUICK_SPACINGS if quick else FULL_SPACINGS)])
-    at = own * (QUICK_KNOB_SPACING if quick else FULL_KNOB_SPACING)
+    shared = refined(
+        scenario, [setting.spacing for setting in settings], REFINED_SPACINGS if quick else FULL_REFINED_SPACINGS
+    )
+    at = own * KNOB_SPACING
     for knob, levels in KNOBS.items():
         # Other formulations have no drag: nothing to turn there.
         if knob == "drag" and not isinstance(scenario.flow, TwoPhaseFlow):
@@ -94,13 +116,69 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
             settings += [_turned(base, knob, level, own * factor) for factor in COMBINATION_SPACINGS]
     for effect, other in without_effects(base).items():
         settings.append(Setting(f"{effect}, spacing {at:.4g}", effect, None, _at(other, at), physics=True))
-    return list({setting.key: setting for setting in reversed(settings)}.values())[::-1]
+    return list({setting.key: setting for setting in reversed(settings)}.values())[::-1] + shared
 
 
 def ladder(scenario: Scenario, spacings: Sequence[float]) -> list[Setting]:
     """The scenario's own settings at several spacings [m]."""
     base = _bare(scenario)
     return [Setting(f"spacing {spacing:.4g}", DEFAULT, None, _at(base, spacing)) for spacing in spacings]
+
+
+def known_ladder(scenario: Scenario, spacings: Sequence[float]) -> list[Setting]:
+    """A ladder, and what tells how far its answer is known; see `refined`."""
+    return ladder(scenario, spacings) + refined(scenario, spacings)
+
+
+def refinements(scenario: Scenario) -> dict[str, dict[str, Any]]:
+    """What refines each setting that a ladder of spacings shares, by the setting's name: changes of the scenario.
+
+    The time step, the loss of the transfer and the strength of the filters are halved, points are made more, records
+    denser; `EVERYTHING` is all of that at once. What is off stays off.
+    """
+    numerics = scenario.numerics
+    own = [name for name in LOSSES if name in SCHEMES.named(numerics.transfer).settings.model_fields]
+    halved = [name for name in (*HALVED, *own) if getattr(numerics, name) > 0.0]
+    if not numerics.volumetric_smoothing and "density_correction" in halved:
+        halved.remove("density_correction")  # it has nothing to work on
+    found: dict[str, dict[str, Any]] = {name: {f"numerics.{name}": 0.5 * getattr(numerics, name)} for name in halved}
+    more = [number for number in POINTS if number > numerics.points_per_cell]
+    if more:
+        found["points_per_cell"] = {"numerics.points_per_cell": more[0]}
+    interval = scenario.output.time_series_interval_s
+    found[INTERVAL] = {"output.time_series_interval_s": 0.5 * interval}
+    return found | {EVERYTHING: {path: value for change in found.values() for path, value in change.items()}}
+
+
+def refined(
+    scenario: Scenario, spacings: Sequence[float], factors: Sequence[float] = REFINED_SPACINGS
+) -> list[Setting]:
+    """Runs that tell what the settings do that a ladder of these spacings [m] shares.
+
+    Each has the spacing of a rung, against which it is held: the next one at or above a factor times the finest, with
+    each setting refined alone, and all of them, at the first factor, and all of them at the second.
+    """
+    base, finest = _bare(scenario), min(spacings)
+    changes = refinements(base)
+    settings = []
+    for factor, names in zip(factors, ([*changes], [EVERYTHING]), strict=True):
+        at = min((one for one in spacings if one >= factor * finest * (1.0 - 1e-9)), default=max(spacings))
+        settings += [_refined(base, name, changes[name], at) for name in names]
+    return list({setting.key: setting for setting in settings}.values())
+
+
+def refined_everything(scenario: Scenario, spacing: float) -> Setting:
+    """All that a ladder shares refined at once, at a spacing [m]."""
+    base = _bare(scenario)
+    return _refined(base, EVERYTHING, refinements(base)[EVERYTHING], spacing)
+
+
+def _refined(base: Scenario, name: str, changes: Mapping[str, Any], spacing: float) -> Setting:
+    level = None if name == EVERYTHING else next(iter(changes.values()))
+    text = f"{name} refined" if level is None else f"{name} {level_text(level)}"
+    return Setting(
+        f"{text}, spacing {spacing:.4g}", name, level, _at(base, spacing).replaced(dict(changes)), refined=True
+    )
 
 
 def without_effects(scenario: Scenario) -> dict[str, Scenario]:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from io import StringIO
 
-from warp_mpm.accuracy.errors import QUANTITIES
+from warp_mpm.accuracy.budget import LABELS, SPACING, TOGETHER
+from warp_mpm.accuracy.errors import KEY_QUANTITIES, QUANTITIES
 from warp_mpm.accuracy.formulas import Formula
 from warp_mpm.accuracy.verdict import TARGETS, Study, sentences
 
-SHOWN = ("peak_force", "impulse", "barrier_displacement_final", "pore_pressure_max", "energy_curve")
+SHOWN = ("peak_force", "impulse", "barrier_displacement_final", "pressure_patch_max", "energy_curve")
 """Quantities of the Markdown table; the CSV has all."""
+
+CURVES_TOLD = ("force_curve", "energy_curve", "displacement_curve")
+"""Curves whose uncertainty is told part by part beside that of the figures."""
 
 
 def csv_table(study: Study) -> str:
@@ -25,7 +30,7 @@ def csv_table(study: Study) -> str:
         + [f"{name} [SI]" for name in scalars]
         + [f"error of {name} [-]" for name in names]
     )
-    for row in sorted(study.rows, key=lambda row: row.time):
+    for row in sorted([*study.rows, *study.refined], key=lambda row: row.time):
         result = row.result
         writer.writerow(
             [row.setting.name, row.setting.knob, row.setting.level, row.setting.spacing, result["status"]]
@@ -54,12 +59,76 @@ def prices(study: Study) -> list[str]:
             if reference is not None:
                 cells[1] = f"{reference.value * quantity.factor:.4g} {quantity.unit}"
                 cells[3] = "none" if reference.order is None else f"{reference.order:.2g}"
-        cells[2] = f"± {study.doubt(name):.1%}"
+        converges = name == "overall" or QUANTITIES[name].converges
+        cells[2] = f"± {study.doubt(name):.1%}" if converges else "–"
         for target in TARGETS:
             row = study.price(name, target)
             cells.append("–" if row is None else f"{row.time:.2g} s ({row.setting.name})")
         lines.append("| " + " | ".join(cells) + " |")
-    return [*lines, "", "–: no setting of the study keeps it, or the reference is not known so well."]
+    return [
+        *lines,
+        "",
+        "–: no setting of the study keeps it, or the reference is not known so well. Known to: spacing and shared "
+        "settings together, see the uncertainty budget.",
+    ]
+
+
+def budget_table(study: Study) -> list[str]:
+    """What makes up the uncertainty of the references: the spacing, and each setting that all spacings share."""
+    budget = study.references.budget
+    if budget.at is None:
+        return ["The uncertainty is the spacing's alone: what the runs share was not looked at."]
+    names = [name for name in study.references.names if name in (*study.references.told_names, *CURVES_TOLD)]
+    finer = {row.setting.knob: row.setting.name.partition(",")[0] for row in study.refined}
+    lines = [
+        f"What each cause does. Settings were refined one by one at {budget.at:g} m, each held against the scenario's "
+        "own settings there. The part of the settings is the root of the squares of their changes, or the change with "
+        "all of them at once where that is more; twice that where the runs with all at once do not show that it falls "
+        "with the spacing. Known to: the root of the squares of the spacing's part and of the settings'.",
+        "",
+        "| cause | refined to | " + " | ".join(_short(name) for name in names) + " |",
+        "|---|---|" + "---:|" * len(names),
+        _line(LABELS[SPACING], "its limit", [f"± {budget.spacing[name]:.2%}" for name in names]),
+    ]
+    lines += [
+        _line(LABELS[cause], finer[cause].rpartition(" ")[2], [_change(part.get(name)) for name in names])
+        for cause, part in budget.settings.items()
+    ]
+    lines += [
+        _line(TOGETHER, f"the same, at {spacing:g} m", [_change(part.get(name)) for name in names])
+        for spacing, part in sorted(budget.together.items(), reverse=True)
+    ]
+    shared = [f"± {budget.shared(name):.2%}{'' if budget.falls(name) else ' (twice)'}" for name in names]
+    lines.append(_line("part of the settings", "", shared))
+    lines.append(_line("**known to**", "", [f"**± {budget.total(name):.2%}**" for name in names]))
+    lines.append(_line("greatest part", "", [budget.greatest(name) for name in names]))
+    if budget.lost:
+        lines += ["", f"Diverged when refined, so not in the table: {', '.join(budget.lost)}."]
+    return lines
+
+
+def scenes_table(studies: Sequence[Study]) -> list[str]:
+    """How far the key figures of several scenes are known, what limits that, and how their errors fall."""
+    known = " | ".join(f"{_short(name)} known to" for name in KEY_QUANTITIES)
+    lines = [
+        f"| scene | {known} | greatest part of the worst | the worst error falls | spacing for 5% |",
+        "|---|" + "---:|" * len(KEY_QUANTITIES) + "---|---|---:|",
+    ]
+    for study in studies:
+        references, worst, spacing = study.references, study.worst, study.recommended_spacing
+        doubts = [f"± {study.doubt(name):.1%}" if name in references.key_names else "–" for name in KEY_QUANTITIES]
+        cause = f"{_short(worst)}: {references.budget.greatest(worst)}"
+        advised = "–" if spacing is None else f"{spacing:g} m"
+        lines.append(_line(study.scenario.title, doubts, cause, str(study.slopes["overall"]), advised))
+    return lines
+
+
+def _line(*cells: str | list[str]) -> str:
+    return "| " + " | ".join(" | ".join(cell) if isinstance(cell, list) else cell for cell in cells) + " |"
+
+
+def _change(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.2%}"
 
 
 def markdown(study: Study, found: list[Formula]) -> str:
@@ -80,11 +149,15 @@ def markdown(study: Study, found: list[Formula]) -> str:
         "## What each percent costs",
         "",
         *prices(study),
+        "",
+        "## How far the reference is known",
+        "",
+        *budget_table(study),
     ]
     lines += ["", "## Runs, cheapest first", ""]
     headings = ["setting", "CPU time [s]", "steps", "key figures"] + [_short(name) for name in shown]
     lines += ["| " + " | ".join(headings) + " | front |", "|---|" + "---:|" * (len(headings) - 1) + "---|"]
-    for row in sorted(study.rows, key=lambda row: row.time):
+    for row in sorted([*study.rows, *study.refined], key=lambda row: row.time):
         cells = [row.setting.name, f"{row.time:.2g}", str(row.result["steps"])]
         if row.errors:
             cells += [f"{row.overall:.1%}", *(_signed(row.errors.get(name)) for name in shown)]

@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from warp_mpm.accuracy.budget import LABELS, TOGETHER
 from warp_mpm.accuracy.errors import QUANTITIES, References, errors, ladder_of, overall, references
 from warp_mpm.accuracy.runner import Result
 from warp_mpm.accuracy.study import DEFAULT, Setting, level_text
@@ -24,6 +27,9 @@ LADDER = 3
 
 NEGLIGIBLE = 0.003
 """Change of the error that is none."""
+
+UNEXPLAINED = 0.25
+"""Share of what the errors' logarithms vary that a straight line may leave, if it is to tell how the errors fall."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +96,43 @@ class Knob:
 
 
 @dataclass(frozen=True)
+class Slope:
+    """How an error falls along the ladder of the scenario's own settings, above the spacing's part of the doubt.
+
+    What the settings do that all spacings share is the same mistake in the runs and in the reference, so it hides no
+    order of the spacing.
+    """
+
+    cost: float | None
+    """x in error ~ cost^-x; None where it does not fall like that."""
+    spacing: float | None
+    """p in error ~ spacing^p; None where it does not fall like that."""
+
+    def __str__(self) -> str:
+        parts = []
+        if self.cost is not None:
+            parts.append(f"error ~ cost^-{self.cost:.2g}")
+        if self.spacing is not None:
+            parts.append(f"{'' if parts else 'error '}~ spacing^{self.spacing:.2g}")
+        return ", ".join(parts) or "no order seen"
+
+
+@dataclass(frozen=True)
 class Study:
     """The whole of a study, evaluated."""
 
     scenario: Scenario
     references: References
     rows: list[Row]
-    """Without the runs that left an effect out."""
+    """Without the runs that left an effect out, and without those that were refined for the reference's sake."""
+    refined: list[Row]
+    """Runs that tell what the settings do that the ladder shares."""
     effects: list[Effect]
     knobs: list[Knob]
     fronts: dict[str, list[Row]] = field(repr=False)
     """By quantity and for `overall`: the cheapest choices, cheap first."""
+    slopes: dict[str, Slope] = field(repr=False)
+    """How the error falls with cost and spacing, by the same names."""
 
     def price(self, name: str, target: float) -> Row | None:
         """The cheapest setting that keeps an error; None where none does.
@@ -108,16 +140,24 @@ class Study:
         A setting counts by the greatest of its own error and those of the finer ones of its ladder: that two errors
         cancel at one spacing is no accuracy. No setting keeps less than what the reference is known to.
         """
-        if self.doubt(name) > target:
+        if self.doubt(name) > target or (name in QUANTITIES and not QUANTITIES[name].converges):
             return None
         kept = [row for row in self.rows if self._lasting(row, name) <= target]
         return min(kept, key=lambda row: row.time, default=None)
 
     def doubt(self, name: str) -> float:
         """Relative uncertainty of a quantity's reference; for `overall` the greatest of the key quantities'."""
-        if name == "overall":
-            return max(self.references.uncertainty(key) for key in self.references.key_names)
-        return self.references.uncertainty(name)
+        return self.references.uncertainty(self.worst if name == "overall" else name)
+
+    def spacing_doubt(self, name: str) -> float:
+        """The spacing's part of that uncertainty; for `overall` the greatest of the key quantities'."""
+        names = self.references.key_names if name == "overall" else [name]
+        return max(self.references.budget.spacing[key] for key in names)
+
+    @property
+    def worst(self) -> str:
+        """The key quantity whose reference is known least."""
+        return max(self.references.key_names, key=self.references.uncertainty)
 
     @property
     def recommended_spacing(self) -> float | None:
@@ -175,13 +215,14 @@ def evaluate(scenario: Scenario, settings: Sequence[Setting], results: Mapping[s
     Raises:
         ValueError: fewer than three spacings of the scenario's own settings came to their end.
     """
-    found = references(scenario, ladder_of(settings), results)
+    shared = [setting for setting in settings if setting.refined]
+    found = references(scenario, ladder_of(settings), results, shared)
     rows = []
     for setting in settings:
         result = results[setting.key]
         wrong = errors(result, found) if result["status"] == "finished" else {}
         rows.append(Row(setting, result, wrong, overall(wrong, found)))
-    numeric = [row for row in rows if not row.setting.physics]
+    numeric = [row for row in rows if not row.setting.physics and not row.setting.refined]
     default = {row.setting.spacing: row for row in numeric if row.setting.knob == DEFAULT}
     effects = [
         Effect(row.setting.knob, _changes(row, default[row.setting.spacing], found), _ratio(row, default))
@@ -203,7 +244,39 @@ def evaluate(scenario: Scenario, settings: Sequence[Setting], results: Mapping[s
     ]
     fronts = {name: front(numeric, name, found.uncertainty(name)) for name in found.names}
     fronts["overall"] = front(numeric, "overall", doubt)
-    return Study(scenario, found, numeric, effects, knobs, fronts)
+    refined = [row for row in rows if row.setting.refined]
+    study = Study(scenario, found, numeric, refined, effects, knobs, fronts, {})
+    for name in fronts:
+        above = sloping(study, name)
+        cost = _falling([(1.0 / row.time, error_of(row, name)) for row in above if row.time > 0.0])
+        study.slopes[name] = Slope(cost, _falling([(row.setting.spacing, error_of(row, name)) for row in above]))
+    return study
+
+
+def sloping(study: Study, name: str) -> list[Row]:
+    """The runs of the ladder of the scenario's own settings from whose errors it is told how these fall: those above
+    the spacing's part of the doubt, without a run that is itself the reference."""
+    known = study.references
+    names = known.key_names if name == "overall" else [name]
+    extrapolated = all(key in known.scalars and known.scalars[key].order is not None for key in names)
+    return [
+        row
+        for row in study.rows
+        if row.setting.knob == DEFAULT
+        and (extrapolated or row.result is not known.finest)
+        and study.spacing_doubt(name) < error_of(row, name) < math.inf
+    ]
+
+
+def _falling(points: Sequence[tuple[float, float]]) -> float | None:
+    """Power with which the second of each pair falls with the first; None where they are too few, or it does not."""
+    if len(points) < LADDER:
+        return None
+    size, error = np.log(np.array(points)).T
+    slope, offset = np.polyfit(size, error, 1)
+    rest = float(np.sum((error - slope * size - offset) ** 2))
+    straight = rest <= UNEXPLAINED * float(np.sum((error - error.mean()) ** 2))
+    return float(slope) if slope > 0.0 and straight else None
 
 
 def front(rows: Sequence[Row], name: str, doubt: float = 0.0) -> list[Row]:
@@ -222,10 +295,7 @@ def front(rows: Sequence[Row], name: str, doubt: float = 0.0) -> list[Row]:
 def sentences(study: Study) -> list[str]:
     """What a person wants to read off."""
     said = []
-    names = ["overall", *study.references.key_names, "pore_pressure_max"]
-    for name in names:
-        if name != "overall" and name not in study.references.names:
-            continue
+    for name in ["overall", *study.references.told_names]:
         label = "the key figures" if name == "overall" else QUANTITIES[name].label
         cheapest = {}
         for target in TARGETS:  # of a setting that keeps several, the tightest is told
@@ -236,10 +306,15 @@ def sentences(study: Study) -> list[str]:
         best = min((error_of(row, name) for row in study.rows), default=math.inf)
         doubt = study.doubt(name)
         if doubt > TARGETS[0]:
-            said.append(f"{label}: the finest runs tell it to {doubt:.1%} only, so no setting is known to keep less.")
+            said.append(f"{label}: the reference is known to {doubt:.1%} only, so no setting is known to keep less.")
             continue
         answer = "; ".join(prices) if prices else f"no run keeps {TARGETS[0]:.0%}, the best is off by {best:.1%}"
         said.append(f"{label}: {answer}; the reference is known to {doubt:.1%}.")
+    said += _known_to(study)
+    said.append(
+        f"As the spacing falls, down to its own part of the uncertainty of the key figures, "
+        f"{study.spacing_doubt('overall'):.1%}: {study.slopes['overall']}."
+    )
     for knob in study.knobs:
         said.append(
             f"{knob.name} {level_text(knob.level)}: {knob.verdict}: {knob.time_ratio:.2g} times the time, error "
@@ -253,6 +328,25 @@ def sentences(study: Study) -> list[str]:
         else f"Recommended spacing: {spacing:g} m, the coarsest that keeps {DEFAULT_TARGET:.0%} on the key figures, as "
         "all finer ones do."
     )
+    return said
+
+
+def _known_to(study: Study) -> list[str]:
+    """What limits the reference, in words."""
+    budget = study.references.budget
+    if budget.at is None:
+        return ["What the settings do that all runs share was not looked at: the uncertainty is the spacing's alone."]
+    name = study.worst
+    fall = "falls with the spacing" if budget.falls(name) else "was not seen to fall with the spacing, so counts twice"
+    said = [
+        f"The {QUANTITIES[name].label} is known least, to {budget.total(name):.1%}: {budget.spacing[name]:.1%} from "
+        f"the spacing, {budget.shared(name):.1%} from the settings that all spacings share, whose effect {fall}; "
+        f"{budget.greatest(name)} contributes most."
+    ]
+    said += [
+        f"With the {LABELS.get(setting, TOGETHER)} refined the run diverged, so the uncertainty lacks that part."
+        for setting in budget.lost
+    ]
     return said
 
 

@@ -14,7 +14,7 @@ from analytic.command_line import complain, refusals
 from warp_mpm.commands.options import agreed, with_options
 
 if TYPE_CHECKING:
-    from warp_mpm.accuracy.purchase import Offer
+    from warp_mpm.accuracy.offer import Offer
     from warp_mpm.accuracy.runner import StudyProgress
     from warp_mpm.scenario import Scenario
 
@@ -67,8 +67,8 @@ def accuracy(
     runs.csv, and pictures. The same command again runs only what is missing; what was run is found by the hash of
     scene, settings and program.
 
-    With --check, ten new scenes are drawn around the scenario, bought, run and compared with finer runs; the table is
-    in check.md.
+    With --check, ten new scenes are drawn around the scenario, bought, run and compared with runs that are refined in
+    everything; the table is in check.md.
 
     Exit codes: 0 done, 1 the promises did not hold in nine of ten scenes (--check), 2 the input cannot be used,
     130 interrupted.
@@ -76,7 +76,7 @@ def accuracy(
     with refusals():
         from warp_mpm.accuracy.report import place_in, put_into_page, study_block, write_ladders, write_study
         from warp_mpm.accuracy.runner import run_settings
-        from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, ladder, plan
+        from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, known_ladder, plan
         from warp_mpm.scenario import Scenario
 
         scenes = [with_options(Scenario.load(path), spacing=None, until=until) for path in scenarios]
@@ -87,18 +87,20 @@ def accuracy(
         if check:
             if len(scenes) != 1 or data is not None or quick:
                 raise ValueError("--check draws scenes around one scenario; --quick and --data do not go with it.")
-            _check(scenes[0], folder, page)
+            _check(scenes[0], folder, page, jobs or os.cpu_count() or 1)
             return
         if data is not None and not data.parent.is_dir():
             raise ValueError(f"--data {data} must be a file in a folder that exists.")
         if len(scenes) == 1:
+            if scenes[0].barrier is None:
+                raise ValueError("This scene has no barrier, so it has no key figures whose errors could be measured.")
             plans = [plan(scenes[0], quick=quick)]
         else:
             factors = QUICK_LADDER if quick else FULL_LADDER
-            plans = [ladder(scene, [factor * scene.numerics.spacing_m for factor in factors]) for scene in scenes]
+            plans = [known_ladder(scene, [factor * scene.numerics.spacing_m for factor in factors]) for scene in scenes]
         folder.mkdir(parents=True, exist_ok=True)
         try:
-            with _progress(sum(map(len, plans))) as show:
+            with _progress(len({setting.key for settings in plans for setting in settings})) as show:
                 results = run_settings(
                     [setting for settings in plans for setting in settings],
                     folder / "results",
@@ -115,21 +117,27 @@ def accuracy(
             pictures = [folder / "error_against_time.png", folder / "each_setting.png", folder / "where_time_goes.png"]
         else:
             block = write_ladders(folder, list(zip(scenes, plans, strict=True)), results)
-            pictures = [folder / "closed_form.png"]
+            pictures = [folder / "error_against_cost.png", folder / "closed_form.png"]
         if page is not None:
             put_into_page(page, folder.name, block, pictures)
         if data is not None:
-            from warp_mpm.accuracy.purchase import write_data
+            from warp_mpm.accuracy.shipped import write_data
 
             write_data(data, list(zip(scenes, plans, strict=True)), results)
         typer.echo(f"Tables and pictures: {folder}", err=True)
 
 
-def _check(scenario: Scenario, folder: Path, page: Path | None) -> None:
+def _check(scenario: Scenario, folder: Path, page: Path | None, jobs: int) -> None:
     from warp_mpm.accuracy.check import check, drawn, holds, table
     from warp_mpm.accuracy.report import put_into_page
 
-    checks = check(drawn(scenario), folder / "checks", on_progress=lambda line: typer.echo(line, err=True))
+    try:
+        checks = check(
+            drawn(scenario), folder / "checks", jobs=jobs, on_progress=lambda line: typer.echo(line, err=True)
+        )
+    except KeyboardInterrupt:
+        complain(f"Interrupted; what ended is in {folder}. The same command goes on from there.")
+        raise typer.Exit(INTERRUPTED) from None
     text = table(checks)
     (folder / "check.md").write_text(text, encoding="utf-8")
     typer.echo(text)
@@ -157,8 +165,9 @@ def bought(
     """
     with refusals():
         from warp_mpm.accuracy.kept import Kept
+        from warp_mpm.accuracy.offer import percent, seconds
         from warp_mpm.accuracy.pace import Machine
-        from warp_mpm.accuracy.purchase import buy, percent, seconds
+        from warp_mpm.accuracy.purchase import buy
 
         say = (lambda sentence: None) if quiet else (lambda sentence: typer.echo(sentence, err=True))
         asked = {
