@@ -254,8 +254,8 @@ class TestKeys:
 
     def test_ladder_whose_figures_were_made_by_other_rules_is_not_used(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert shipped.shipped_scenes(), (
-            "The rules that make figures have changed: python -m warp_mpm accuracy scenarios/*.json "
-            "--data warp_mpm/accuracy/paper_scenes.json"
+            "The rules that make figures have changed, or what is shipped lacks what the settings do; take it anew by "
+            "python -m warp_mpm accuracy SCENARIO... --quick --data warp_mpm/accuracy/paper_scenes.json, as in the Makefile"
         )
         monkeypatch.setattr(shipped, "rules_digest", lambda: "other")
         assert not shipped.shipped_scenes()
