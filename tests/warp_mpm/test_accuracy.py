@@ -255,7 +255,7 @@ class TestKeys:
     def test_ladder_whose_figures_were_made_by_other_rules_is_not_used(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert shipped.shipped_scenes(), (
             "The rules that make figures have changed, or what is shipped lacks what the settings do; take it anew by "
-            "python -m warp_mpm accuracy SCENARIO... --quick --data warp_mpm/accuracy/paper_scenes.json, as in the Makefile"
+            "the command of `make accuracy` that has --data"
         )
         monkeypatch.setattr(shipped, "rules_digest", lambda: "other")
         assert not shipped.shipped_scenes()
