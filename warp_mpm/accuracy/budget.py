@@ -37,7 +37,8 @@ class Budget:
 
     Halving takes half of an effect of first order away, and an effect that falls with the spacing is twice as large
     there as at the finest, or more: then the change is no less than what the finest run still has of it, and is taken
-    as it is. Where the runs with everything refined, at two spacings, do not show that it falls, it counts twice.
+    as it is. Where everything refined does the same at two spacings, it goes on as it began, and counts twice; where it
+    does this here and that there, it is scatter, which has no rest.
     """
 
     spacing: Mapping[str, float]
@@ -53,19 +54,21 @@ class Budget:
 
     def shared(self, name: str) -> float:
         """Part of all settings that the ladder shares."""
-        return (1.0 if self.falls(name) else 2.0) * self.change(name)
+        return (2.0 if self.stays(name) else 1.0) * self.change(name)
 
     def change(self, name: str) -> float:
         """What refining the settings changes: the root of their squares, or all at once where that is more."""
         squares = math.hypot(*(part.get(name, 0.0) for part in self.settings.values()))
         return max(squares, abs(self._at_once(name)))
 
-    def falls(self, name: str) -> bool:
-        """Whether what all settings do at once falls with the spacing, by an order of a half at least."""
+    def stays(self, name: str) -> bool:
+        """Whether all settings at once do the same at both spacings: what falls does so by an order of a half at least,
+        and what grows by more than the root of two is scatter."""
         coarser = max((spacing for spacing in self.together if self.at is not None and spacing > self.at), default=None)
-        if self.at is None or coarser is None or name not in self.together[coarser]:
+        if self.at is None or coarser is None:
             return False
-        return abs(self._at_once(name)) <= abs(self.together[coarser][name]) * math.sqrt(self.at / coarser)
+        here, there = self._at_once(name), self.together[coarser].get(name, 0.0)
+        return here * there > 0.0 and math.sqrt(self.at / coarser) < here / there <= math.sqrt(2.0)
 
     def total(self, name: str) -> float:
         """Relative uncertainty of a quantity's reference."""

@@ -40,7 +40,8 @@ def measure(
 ) -> dict[str, Any]:
     """Run a scenario without writing anything.
 
-    Times are CPU times of this process, which a machine that is busy with other things does not stretch.
+    Times are CPU times of this process, which a machine that is busy with other things does not stretch. Figures and
+    curves are those of records every `SERIES_INTERVAL` where the scenario's are denser.
 
     Args:
         scenario: what to run.

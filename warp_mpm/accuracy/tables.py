@@ -83,8 +83,8 @@ def budget_table(study: Study) -> list[str]:
     lines = [
         f"What each cause does. Settings were refined one by one at {budget.at:g} m, each held against the scenario's "
         "own settings there. The part of the settings is the root of the squares of their changes, or the change with "
-        "all of them at once where that is more; twice that where the runs with all at once do not show that it falls "
-        "with the spacing. Known to: the root of the squares of the spacing's part and of the settings'.",
+        "all of them at once where that is more; twice that where all of them at once do the same at both spacings, so "
+        "that it does not fall. Known to: the root of the squares of the spacing's part and of the settings'.",
         "",
         "| cause | refined to | " + " | ".join(_short(name) for name in names) + " |",
         "|---|---|" + "---:|" * len(names),
@@ -98,7 +98,7 @@ def budget_table(study: Study) -> list[str]:
         _line(TOGETHER, f"the same, at {spacing:g} m", [_change(part.get(name)) for name in names])
         for spacing, part in sorted(budget.together.items(), reverse=True)
     ]
-    shared = [f"± {budget.shared(name):.2%}{'' if budget.falls(name) else ' (twice)'}" for name in names]
+    shared = [f"± {budget.shared(name):.2%}{' (twice)' if budget.stays(name) else ''}" for name in names]
     lines.append(_line("part of the settings", "", shared))
     lines.append(_line("**known to**", "", [f"**± {budget.total(name):.2%}**" for name in names]))
     lines.append(_line("greatest part", "", [budget.greatest(name) for name in names]))

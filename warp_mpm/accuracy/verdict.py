@@ -337,10 +337,10 @@ def _known_to(study: Study) -> list[str]:
     if budget.at is None:
         return ["What the settings do that all runs share was not looked at: the uncertainty is the spacing's alone."]
     name = study.worst
-    fall = "falls with the spacing" if budget.falls(name) else "was not seen to fall with the spacing, so counts twice"
+    twice = ", whose effect is the same at two spacings and so counts twice" if budget.stays(name) else ""
     said = [
         f"The {QUANTITIES[name].label} is known least, to {budget.total(name):.1%}: {budget.spacing[name]:.1%} from "
-        f"the spacing, {budget.shared(name):.1%} from the settings that all spacings share, whose effect {fall}; "
+        f"the spacing, {budget.shared(name):.1%} from the settings that all spacings share{twice}; "
         f"{budget.greatest(name)} contributes most."
     ]
     said += [
