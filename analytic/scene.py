@@ -95,6 +95,33 @@ class Scene:
         )
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """Numbers that are likely not those meant, of a scene that no scenario tells: a slip of the unit, mostly."""
+        found = []
+        if not 500.0 <= self.density <= 4000.0:
+            meant = f"; in t it makes {1e3 * self.density:.4g} kg/m^3" if 0.5 <= self.density <= 4.0 else ""
+            found.append(
+                f"The flow's density, its mass over length and depth, is {self.density:.3g} kg/m^3; debris flows have "
+                f"1300 to 2300{meant}."
+            )
+        if self.barrier_mass is not None and self.barrier_mass < 0.01 * self.flow_mass:
+            found.append(
+                f"barrier_mass = {self.barrier_mass:g} kg/m is less than a hundredth of the flow's {self.flow_mass:g} "
+                f"kg/m; {1e3 * self.barrier_mass:g} was probably meant, the value is in t/m."
+            )
+        if self.base_friction is not None and self.base_friction > 2.0:
+            found.append(
+                f"base_friction = {self.base_friction:g} is the tangent of "
+                f"{math.degrees(math.atan(self.base_friction)):.0f} degrees; where degrees were meant, "
+                f"{math.tan(math.radians(self.base_friction)):.2g}."
+            )
+        if self.speed > 30.0:
+            found.append(f"speed = {self.speed:g} m/s is above any debris flow's; in km/h, {self.speed / 3.6:.3g} m/s.")
+        if self.face_angle is not None and 0.0 < self.face_angle <= 1.6:
+            found.append(f"face_angle = {self.face_angle:g} degrees; in radians, {math.degrees(self.face_angle):.3g}.")
+        return tuple(found)
+
+    @property
     def paper_geometry_change(self) -> float:
         """The paper's lambda for this kind of barrier [-]."""
         return PAPER_GEOMETRY_CHANGE["fixed" if self.fixed else "sliding"]
@@ -139,6 +166,8 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     ------
     SceneError: it has no barrier, one that follows a given velocity, or a flow that does not move towards it.
     """
+    from warp_mpm.slips import slips
+
     flow, barrier = scenario.flow, scenario.barrier
     if barrier is None:
         raise SceneError(f"{name}: barrier is null, the closed form needs one.")
@@ -148,7 +177,7 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     velocity_x, velocity_y = flow.velocity_m_per_s
     if velocity_x <= 0:
         raise SceneError(f"{name}: flow.velocity_m_per_s[0] is {velocity_x:g}, the flow must move towards the barrier.")
-    remarks = []
+    remarks = slips(scenario)
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
     if scenario.ground is not None and scenario.ground.friction != 0:

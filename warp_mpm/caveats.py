@@ -11,14 +11,12 @@ import numpy as np
 from warp_mpm.extent import domain_caveats
 from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
 from warp_mpm.simulator.laws import LAWS
+from warp_mpm.slips import slips
 
 Key = TypeVar("Key")
 
 LEAST_CELLS = 4.0
 """Cells over the flow's depth below which even peak forces were a tenth off (case 1 at 3.75: 11 %)."""
-
-WATER = 1000.0
-"""Density [kg/m³] that no rock falls short of."""
 
 GREATEST_FRICTION = 2.0
 """Friction coefficient, that is 63°, above which no rock rubs on another."""
@@ -42,9 +40,7 @@ def scene_caveats(scenario: Scenario) -> list[str]:
             f"The flow's depth has {cells:.2g} cells; below {LEAST_CELLS:g} (numerics.spacing_m = "
             f"{flow.depth / LEAST_CELLS:.3g}) expect figures to be off by a tenth and more."
         )
-    grains = flow.material.grain_density_kg_per_m3
-    if grains < WATER:
-        found.append(f"flow.material.grain_density_kg_per_m3 = {grains:g} is lighter than water; rock has about 2650.")
+    found += slips(scenario)
     found += LAWS.named(flow.material.law).caveats(flow.material)
     found += [*_unlikely_friction(scenario), *_impossible_start(scenario)]
     if scenario.barrier is not None and not _can_arrive(scenario):
@@ -71,7 +67,11 @@ def _unlikely_friction(scenario: Scenario) -> list[str]:
         return []
     told = ", ".join(f"{name} = {value:g}" for name, value in high.items())
     angle = math.degrees(math.atan(max(high.values())))
-    return [f"{told}: a friction coefficient above {GREATEST_FRICTION:g}, up to {angle:.0f}°; rock has about 0.6."]
+    meant = ", ".join(f"{math.tan(math.radians(value)):.2g}" for value in high.values())
+    return [
+        f"{told}: a friction coefficient above {GREATEST_FRICTION:g}, up to {angle:.0f}°; rock has about 0.6. Where "
+        f"degrees were meant, it is their tangent: {meant}."
+    ]
 
 
 def _impossible_start(scenario: Scenario) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
 from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
 
@@ -21,6 +23,21 @@ def described(scenario: Scenario) -> list[str]:
         f"{_barrier(scenario.barrier)}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
         f"{numerics.spacing_m:g} m grid, {numerics.precision}",
     ]
+
+
+def described_material(scenario: Scenario) -> str:
+    """The flow's material in one line, as a geotechnical engineer asks for it, with its length."""
+    flow = scenario.flow
+    material: Any = flow.material
+    parts = [f"bulk density {material.density:,.4g} kg/m³", f"n = {material.porosity:g}"]
+    if hasattr(material, "friction_angle_deg"):
+        parts.append(f"φ' = {material.friction_angle_deg:g}°")
+    if hasattr(material, "hydraulic_conductivity"):
+        parts.append(f"k = {material.hydraulic_conductivity:.3g} m/s")
+    parts.append(f"E = {material.young_modulus_Pa / 1e6:.4g} MPa")
+    whence = f"by the law {material.law}" if flow.lateral_stress_coefficient is None else "given"
+    parts.append(f"K0 = {flow.lateral_stress_ratio:.3g} ({whence})")
+    return f"{', '.join(parts)}; L = {flow.equivalent_length:.4g} m, of the box of its volume and depth"
 
 
 def described_domain(scenario: Scenario) -> str:

@@ -151,6 +151,8 @@ def design(
             slope=inputs.choose("slope", slope, 0.0),
             remarks=() if base is None else base.remarks,
         )
+        if base is None:
+            scene = replace(scene, remarks=replace(scene, barrier_mass=None).doubts)
         bounds = Bounds(
             height=inputs.choose("barrier_height", height, ASSUMED_HEIGHT_RATIO * scene.flow_height),
             density=inputs.choose("barrier_density", barrier_density, ASSUMED_DENSITY),

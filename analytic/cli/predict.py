@@ -78,7 +78,7 @@ def predict(
             "face_angle": face_angle,
         }
         scene = assemble(scenario, given, fixed)
-        notes = list(scene.notes)
+        notes = [*(scene.doubts if scenario is None else ()), *scene.notes]
         given_model = {
             "s1max": s1max,
             "geometry_change": geometry_change,

@@ -61,7 +61,8 @@ def test_a_slip_is_told(load_scene, changes, words):
     "changes",
     [
         {"flow.velocity_m_per_s": [0.0, 0.0]},  # spreads as a dam break does
-        {"flow.velocity_m_per_s": [-2.0, 0.0], "gravity.tilt_deg": 30.0},  # comes back down the slope
+        # Comes back down the slope.
+        {"flow.velocity_m_per_s": [-2.0, 0.0], "gravity.tilt_deg": 30.0, "ground.friction": 0.1},
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [-20.0]},
          "flow.velocity_m_per_s": [-15.0, 0.0]},  # a barrier that runs after the flow
         {"barrier.motion": {"kind": "prescribed", "times_s": [0.0, 2.0], "velocities_m_per_s": [30.0, 0.0]}},

@@ -15,7 +15,7 @@ def check(
 ) -> None:
     """Check scenario files and tell what they describe; nothing is run or written."""
     from warp_mpm.caveats import scene_caveats
-    from warp_mpm.description import described, described_domain
+    from warp_mpm.description import described, described_domain, described_material
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
@@ -24,7 +24,8 @@ def check(
         try:
             scenario = Scenario.load(file)
             notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
-            tell("\n  ".join([f"{file}: {scenario.title}", *described(scenario), described_domain(scenario), *notes]))
+            card = [*described(scenario), described_material(scenario), described_domain(scenario)]
+            tell("\n  ".join([f"{file}: {scenario.title}", *card, *notes]))
         except ScenarioError as error:
             failed = True
             complain(str(error))
