@@ -28,7 +28,7 @@ from .quantities.time_series import OWN
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
 from .simulator.bodies.arrays import body_arrays, contact_arrays, effects_of
-from .simulator.bodies.loads import slots_of
+from .simulator.bodies.loads import Patches, slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
@@ -188,6 +188,8 @@ class Simulation:
         _check_names(self.bodies)
         self.slots = slots_of(scenario, self.bodies)
         """The barrier's surfaces, divided; None without a barrier."""
+        if self.slots is not None:
+            self._patches = Patches.along(self.slots.face, scenario.output.pressure_patch_m)
         self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
         _start_warp()
         try:
@@ -611,7 +613,7 @@ class Simulation:
             self._read("reactions").tolist(),
             self._barrier_number("base_impulse"),
             self._read("turned").tolist(),
-            self._read("taken").tolist(),
+            self._read("taken").copy(),
             reach=self.scenario.output.pressure_patch_s,
         )
 
@@ -665,7 +667,9 @@ class Simulation:
                 motion.mass if isinstance(motion, Sliding) else 0.0,
             )
         forces, base_force = mean_forces(self.bodies, now, since)
-        loads = None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, now, since)
+        loads = (
+            None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, self._patches, now, since)
+        )
         return Now(
             scenario=self.scenario,
             bodies=self.bodies,
@@ -745,9 +749,15 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._initial_momentum = state["initial_momentum"].tolist()
-        (time, base_impulse), reactions, turned, taken = (state[f"interval.{name}"].tolist() for name in INTERVAL)
-        self._since = replace(self.window(), time=time, base_impulse=base_impulse, reactions=reactions,
-                              turned=turned, taken=taken)  # fmt: skip
+        (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
+        self._since = replace(
+            self.window(),
+            time=float(begin),
+            base_impulse=float(base_impulse),
+            reactions=reactions.tolist(),
+            turned=turned.tolist(),
+            taken=taken.copy(),
+        )
 
     def _state(self) -> dict[str, NDArray[Any]]:
         state = {name: array.numpy() for name, array in self._state_arrays().items()}

@@ -17,7 +17,7 @@ from warp_mpm.results import Results, ResultsError, read_loads
 from warp_mpm.run import resume_run, run_in_memory, run_scenario
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
-from warp_mpm.simulator.bodies.loads import slots_of
+from warp_mpm.simulator.bodies.loads import Patches, slots_of
 from warp_mpm.state.loads import LoadsNow
 from warp_mpm.state.samples import Window
 from warp_mpm.terminal import summary_rows
@@ -163,6 +163,7 @@ def loads_of(load_scene, pressure, times, **changes):
     bodies = Simulation(scenario).bodies
     slots = slots_of(scenario, bodies)
     surfaces = sum(len(body.surfaces) for body in bodies)
+    patches = Patches.along(slots.face, scenario.output.pressure_patch_m)
     middle = 0.5 * (slots.face.edges[1:] + slots.face.edges[:-1])
     found, mark, reach = [], None, scenario.output.pressure_patch_s
     fine = np.linspace(0.0, times[-1], 20_001)
@@ -172,9 +173,9 @@ def loads_of(load_scene, pressure, times, **changes):
     for time in times:
         taken = np.zeros((len(slots), at.SLOT_SIZE))
         taken[slots.face.slots, at.SLOT_NORMAL] = [np.interp(time, fine, column) for column in impulse.T]
-        window = Window(time, [0.0] * 2 * surfaces, 0.0, [0.0] * 2 * surfaces, taken.ravel().tolist(), reach=reach)
+        window = Window(time, [0.0] * 2 * surfaces, 0.0, [0.0] * 2 * surfaces, taken.ravel(), reach=reach)
         if mark is not None:
-            found.append(LoadsNow(scenario, bodies, slots, window, mark))
+            found.append(LoadsNow(scenario, bodies, slots, patches, window, mark))
         mark = window.after(mark)
     return found
 
@@ -220,7 +221,7 @@ def test_a_longer_interval_is_the_time_of_the_mean(load_scene):
 def test_the_trail_of_a_mark_is_short():
     mark = None
     for number in range(1001):
-        mark = replace(Window(1e-4 * number, [], 0.0, [], [float(number)], reach=0.02)).after(mark)
+        mark = replace(Window(1e-4 * number, [], 0.0, [], np.array([float(number)]), reach=0.02)).after(mark)
     assert len(mark.trail) <= 18
     assert mark.trail[0][0] <= 0.1 - 0.02 <= mark.trail[1][0]
 

@@ -100,7 +100,7 @@ class LoadsRecorder:
             OSError: it could not be written; those before are kept.
         """
         window = simulation.window()
-        taken = np.array(window.taken)
+        taken = window.taken
         with failures_of_the_disk():
             if self._rows == 0:
                 self._lay_out(simulation)

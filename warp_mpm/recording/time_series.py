@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -58,7 +57,7 @@ class TimeSeriesRecorder:
             self._file = path.open("x", encoding="utf-8", newline="")
             return
         self.schedule.count = mark["records"]
-        self._window = Window(*mark["window"]) if mark["window"] is not None else None
+        self._window = Window.of(mark["window"]) if mark["window"] is not None else None
         try:
             self._file = path.open("r+", encoding="utf-8", newline="")
             header = self._file.readline().rstrip("\n").split(",")
@@ -86,7 +85,7 @@ class TimeSeriesRecorder:
         """Bring everything to the disk and tell where the file stands, and when the last sample was taken."""
         self._file.flush()
         os.fsync(self._file.fileno())
-        window = list(astuple(self._window)) if self._window is not None else None
+        window = self._window.plain() if self._window is not None else None
         return {"records": self.schedule.count, "bytes": os.fstat(self._file.fileno()).st_size, "window": window}
 
     def record(self, simulation: Any) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..kernels import layout as at
 from ..scenario import Scenario, Trapezoid
 from ..simulator.bodies import Body
-from ..simulator.bodies.loads import Slots
+from ..simulator.bodies.loads import Patches, Slots
 from .samples import Window
 
 Array = NDArray[np.float64]
@@ -38,6 +38,8 @@ class LoadsNow:
     scenario: Scenario
     bodies: Sequence[Body]
     slots: Slots
+    patches: Patches
+    """Of the impacted face."""
     now: Window
     since: Window
 
@@ -79,13 +81,13 @@ class LoadsNow:
         known = [*self.since.trail, (self.since.time, self.since.taken)]
         times = [time for time, _ in known]
         later = next((k for k, time in enumerate(times) if time >= start), len(times) - 1)
-        begin, before = times[later], np.array(known[later][1])
+        begin, before = times[later], known[later][1]
         if later > 0 and begin > start:
-            earlier, share = np.array(known[later - 1][1]), (begin - start) / (begin - times[later - 1])
+            earlier, share = known[later - 1][1], (begin - start) / (begin - times[later - 1])
             before, begin = before - share * (before - earlier), start
         elapsed = self.now.time - begin
         face = self.slots.face.slots
-        taken = (np.array(self.now.taken) - before).reshape(-1, at.SLOT_SIZE)[face]
+        taken = (self.now.taken - before).reshape(-1, at.SLOT_SIZE)[face]
         return taken / elapsed if elapsed > 0.0 else np.zeros_like(taken)
 
     @cached_property
@@ -118,13 +120,10 @@ class LoadsNow:
 
     def _greatest(self, load: Array) -> Patch:
         """Of loads [n] of the face's slots [N/m]."""
-        face, base = self.slots.face, self.slots.face.edges
-        length = min(self.scenario.output.pressure_patch_m, float(base[-1] - base[0]))
-        # The load is even within a slot, so that the greatest patch begins or ends at an edge.
-        low = np.concatenate([base[base <= base[-1] - length], base[base >= base[0] + length] - length])
-        until = np.concatenate([[0.0], np.cumsum(load)])
-        mean = (np.interp(low + length, base, until) - np.interp(low, base, until)) / length
-        k = int(np.argmax(mean))
-        if not mean[k] > 0.0:
+        mean = self.patches.means(load)
+        greatest = int(np.argmax(mean))
+        if not mean[greatest] > 0.0:
             return Patch()
-        return Patch(float(mean[k]), float(face.begin[1] + face.along[1] * (low[k] + 0.5 * length)))
+        face = self.slots.face
+        height = face.begin[1] + face.along[1] * self.patches.middle[greatest]
+        return Patch(float(mean[greatest]), float(height))

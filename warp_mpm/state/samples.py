@@ -6,8 +6,11 @@ What each quantity is and how it is read from here stands in `warp_mpm/quantitie
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import layout as at
 from ..quantities import TIME_SERIES, Sampled, force_of_surface, quantities_of
@@ -41,16 +44,16 @@ class Window:
     """Of friction at the barrier's base [N s/m]."""
     turned: Sequence[float] = ()
     """Sums of F_x y and F_y x on each surface of the barrier, one after the other [N s]; nil on other bodies."""
-    taken: Sequence[float] = ()
-    """Of each slot of the barrier (`simulator.bodies.loads`), as in `layout.SLOT_...` [N s/m]."""
-    trail: Sequence[tuple[float, Sequence[float]]] = ()
+    taken: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    """Of each slot of the barrier (`simulator.bodies.loads`), one after the other, as in `layout.SLOT_...` [N s/m]."""
+    trail: Sequence[tuple[float, NDArray[np.float64]]] = ()
     """Times [s] before this one and what `taken` was then, the latest last."""
     reach: float = 0.0
     """How long before this time the trail is to begin [s]."""
 
     def after(self, before: Window | None) -> Window:
         """The same mark, which knows what an earlier one tells of the time within its reach."""
-        if before is None or not self.taken:
+        if before is None or not len(self.taken):
             return self
         trail = list(before.trail)
         # Close marks add nothing that a mean over the reach would show.
@@ -59,6 +62,19 @@ class Window:
         while len(trail) > 1 and trail[1][0] <= self.time - self.reach:
             trail.pop(0)
         return replace(self, trail=trail)
+
+    def plain(self) -> list[Any]:
+        """As lists of numbers, for `of`."""
+        trail = [[time, taken.tolist()] for time, taken in self.trail]
+        sums = [list(self.reactions), self.base_impulse, list(self.turned), self.taken.tolist()]
+        return [self.time, *sums, trail, self.reach]
+
+    @classmethod
+    def of(cls, plain: Sequence[Any]) -> Window:
+        """From `plain`, to the last digit."""
+        time, reactions, base_impulse, turned, taken, trail, reach = plain
+        before = [(then, np.array(sums)) for then, sums in trail]
+        return cls(time, reactions, base_impulse, turned, np.array(taken), before, reach)
 
 
 @dataclass(frozen=True)

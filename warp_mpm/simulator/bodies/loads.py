@@ -59,6 +59,39 @@ class Stretch:
 
 
 @dataclass(frozen=True)
+class Patches:
+    """All patches [P] of one length on a surface that may bear the greatest mean load: the load is even within a slot,
+    so that the greatest one begins or ends at an edge of one."""
+
+    length: float
+    """[m]; that of the surface where it is shorter than what was asked for."""
+    middle: Array
+    """[P] along the surface [m]."""
+    _ends: tuple[tuple[NDArray[np.int64], Array], tuple[NDArray[np.int64], Array]]
+    """Slot [P] in which each begins, and ends, and the share [P] of it that lies before that."""
+
+    @classmethod
+    def along(cls, stretch: Stretch, length: float) -> Patches:
+        """Those of a surface with the length [m]."""
+        edges = stretch.edges
+        length = min(length, float(edges[-1] - edges[0]))
+        low = np.concatenate([edges[edges <= edges[-1] - length], edges[edges >= edges[0] + length] - length])
+
+        def place(at: Array) -> tuple[NDArray[np.int64], Array]:
+            reach = (at - edges[0]) / (edges[1] - edges[0])
+            slot = np.clip(np.floor(reach), 0, len(stretch) - 1).astype(np.int64)
+            return slot, reach - slot
+
+        return cls(length, low + 0.5 * length, (place(low), place(low + length)))
+
+    def means(self, load: Array) -> Array:
+        """Mean [P] over each patch, of loads [n] of the slots [N/m]; a pressure [Pa]."""
+        before = np.cumsum(load) - load
+        (first, start), (last, end) = self._ends
+        return (before[last] + end * load[last] - before[first] - start * load[first]) / self.length
+
+
+@dataclass(frozen=True)
 class Slots:
     """The barrier's surfaces, divided: face, crest, back, those that it has."""
 
