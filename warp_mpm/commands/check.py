@@ -16,6 +16,7 @@ def check(
     """Check scenario files and tell what they describe; nothing is run or written."""
     from warp_mpm.caveats import scene_caveats
     from warp_mpm.description import described, described_domain
+    from warp_mpm.regime import described_regime
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
@@ -24,7 +25,8 @@ def check(
         try:
             scenario = Scenario.load(file)
             notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
-            tell("\n  ".join([f"{file}: {scenario.title}", *described(scenario), described_domain(scenario), *notes]))
+            told = [*described(scenario), described_domain(scenario), described_regime(scenario), *notes]
+            tell("\n  ".join([f"{file}: {scenario.title}", *filter(None, told)]))
         except ScenarioError as error:
             failed = True
             complain(str(error))
