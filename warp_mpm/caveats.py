@@ -81,6 +81,8 @@ def _impossible_start(scenario: Scenario) -> list[str]:
         return []
     found = []
     liquid = material.liquid_density_kg_per_m3 if isinstance(material, UndrainedMaterial) else 0.0
+    if flow.initial_pore_pressure_ratio is not None:
+        liquid = flow.initial_pore_pressure_ratio * material.density
     head = -scenario.gravity.vector[1] * flow.depth
     vertical = (material.density - liquid) * head  # at the base, compression positive
     for field, modulus, pressure, what in (

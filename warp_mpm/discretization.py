@@ -122,9 +122,9 @@ def _join_slivers(
 def material_points(scenario: Scenario) -> MaterialPoints:
     """The scenario's flow as material points, with masses and initial stress.
 
-    Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, the vertical
-    effective stress carries the rest of the weight, and the horizontal ones are K0 times it. Gravity's component along
-    the ground is left out of the initial stress.
+    Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
+    share of the weight; the vertical effective stress carries the rest, and the horizontal ones are K0 times it.
+    Gravity's component along the ground is left out of the initial stress.
     """
     flow, numerics = scenario.flow, scenario.numerics
     material = flow.material
@@ -135,8 +135,11 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         depth = geometry.depth_below_surface(flow.polygon, position)
         downward = -scenario.gravity.vector[1]
         liquid_density = getattr(material, "liquid_density_kg_per_m3", 0.0)
-        pore_pressure = liquid_density * downward * depth
-        vertical = -(material.density - liquid_density) * downward * depth
+        # What the liquid bears of the weight above, as a density: hydrostatic, or the given share of it.
+        share = flow.initial_pore_pressure_ratio
+        borne = liquid_density if share is None else share * material.density
+        pore_pressure = borne * downward * depth
+        vertical = -(material.density - borne) * downward * depth
         lateral = flow.lateral_stress_ratio * vertical
         effective_stress[:, 0], effective_stress[:, 1], effective_stress[:, 2] = lateral, vertical, lateral
     return MaterialPoints(

@@ -45,6 +45,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     flow = scenario.flow
     drag: str = scenario.numerics.drag if isinstance(flow, TwoPhaseFlow) else "none"
     two_phase = isinstance(flow, TwoPhaseFlow)
+    inertial = flow.material.inertial_drag_coefficient if isinstance(flow, TwoPhaseFlow) else 0.0
     porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
     return [
         Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
@@ -53,7 +54,17 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             "drag",
             drag,
             f"two phases, numerics.drag = {drag}" if drag != "none" else "there are no two phases",
-            {"numerics.drag": {"semi_implicit": "explicit", "explicit": "semi_implicit"}[drag]} if two_phase else {},
+            {"numerics.drag": {"semi_implicit": "explicit", "explicit": "semi_implicit"}[drag]}
+            if two_phase and not inertial
+            else {},
+        ),
+        Rule(
+            "inertial_drag",
+            inertial > 0.0,
+            f"flow.material.inertial_drag_coefficient = {inertial:g}" if two_phase else "there are no two phases",
+            {"flow.material.inertial_drag_coefficient": 0.0 if inertial > 0.0 else 0.5}
+            if drag == "semi_implicit"
+            else {},
         ),
         Rule(
             "porosity_update",
@@ -169,6 +180,7 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
         "hydraulic_conductivity_m_per_s",
         "intrinsic_permeability_m2",
         "liquid_viscosity_Pa_s",
+        "inertial_drag_coefficient",
         "porosity_update",
     }
     formulation = "undrained"

@@ -39,6 +39,8 @@ class Effects:
     """Key of the scheme that brings velocities from the points to the nodes and back."""
     drag: Literal["none", "semi_implicit", "explicit"] = "none"
     """Interaction of the phases; only with two of them."""
+    inertial_drag: bool = False
+    """Drag beyond Darcy's, with the square of the slip; implicit, whatever `drag` is."""
     porosity_update: bool = False
     """Porosity follows the skeleton's volume strain; off: Dn/Dt = 0, Eq. (A11)."""
     bodies: bool = False
@@ -103,6 +105,7 @@ class Effects:
                 "volumetric_smoothing",
                 "density_correction",
                 "pressure_relaxation",
+                "inertial_drag",
                 "porosity_update",
                 "bulk_viscosity",
                 "bodies",

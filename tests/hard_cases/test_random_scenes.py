@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from warp_mpm.hard_cases.measure import measure
 from warp_mpm.scenario import Scenario
+from warp_mpm.simulator.laws.mohr_coulomb import MohrCoulomb
 
 BASE = Scenario.load(Path(__file__).parents[2] / "scenarios" / "case_1.json")
 
@@ -18,13 +19,19 @@ def logarithmic(low, high):
     return st.floats(low, high).map(lambda exponent: float(10.0**exponent))
 
 
+def zero_or(low, high):
+    """Nil, or a power of ten between two exponents."""
+    return st.one_of(st.just(0.0), logarithmic(low, high))
+
+
+LAWS = ["mohr_coulomb", "herschel_bulkley", "coulomb_viscous", "mu_i"]
+
+
 def scenes(formulations, precisions, transfers):
     @st.composite
     def draw_scene(draw):
         pick = partial(st.floats, allow_nan=False, allow_infinity=False)
         formulation = draw(st.sampled_from(formulations))
-        friction_angle = draw(pick(0.0, 45.0))
-        cohesion = draw(st.one_of(st.just(0.0), logarithmic(2, 5)))
         depth = draw(pick(1.0, 4.0))
         height = draw(pick(0.5, 8.0))
         data = BASE.resolved()
@@ -39,22 +46,53 @@ def scenes(formulations, precisions, transfers):
         flow["velocity_m_per_s"] = [draw(pick(-5.0, 50.0)), draw(pick(-5.0, 5.0))]
         flow["lateral_stress_coefficient"] = None
         flow["initial_stress"] = draw(st.sampled_from(["geostatic", "zero"]))
+        for name in MohrCoulomb.Settings.model_fields:
+            del material[name]
+        law = draw(st.sampled_from(LAWS))
         material |= {
             "porosity": draw(pick(0.05, 0.9)),
             "young_modulus_Pa": draw(logarithmic(5, 8.3)),
             "poisson_ratio": draw(pick(0.0, 0.45)),
-            "friction_angle_deg": friction_angle,
-            "dilatancy_angle_deg": draw(pick(0.0, 0.3)) * friction_angle,
-            "cohesion_Pa": cohesion,
-            "tension_cutoff_Pa": draw(st.sampled_from([0.0, 0.5])) * cohesion,
+            "law": law,
         }
+        if law in ("mohr_coulomb", "coulomb_viscous"):
+            friction_angle, cohesion = draw(pick(0.0, 45.0)), draw(zero_or(2, 5))
+            material |= {
+                "friction_angle_deg": friction_angle,
+                "dilatancy_angle_deg": draw(pick(0.0, 0.3)) * friction_angle,
+                "cohesion_Pa": cohesion,
+                "tension_cutoff_Pa": draw(st.sampled_from([0.0, 0.5])) * cohesion,
+            }
+        if law == "coulomb_viscous":
+            material["mixture_viscosity_Pa_s"] = draw(zero_or(-3, 6))
+        if law == "herschel_bulkley":
+            material |= {
+                "yield_stress_Pa": draw(zero_or(0, 6)),
+                "consistency_Pa_s": draw(zero_or(-3, 6)),
+                "flow_exponent": draw(pick(0.2, 2.0)),
+                "tension_cutoff_Pa": draw(st.sampled_from([0.0, 1e3])),
+            }
+        if law == "mu_i":
+            static = draw(pick(0.0, 1.0))
+            material |= {
+                "static_friction": static,
+                "dynamic_friction": static + draw(pick(0.0, 1.0)),
+                "inertial_constant": draw(zero_or(-3, 1)),
+                "grain_diameter_m": draw(logarithmic(-5, 0)),
+                "fluid_viscosity_Pa_s": draw(st.one_of(st.none(), zero_or(-3, 3))),
+            }
         wet = ["liquid_density_kg_per_m3", "liquid_bulk_modulus_Pa", "cavitation_pressure_Pa"]
         drained = ["hydraulic_conductivity_m_per_s", "intrinsic_permeability_m2", "liquid_viscosity_Pa_s"]
         if formulation == "two_phase":
             material["hydraulic_conductivity_m_per_s"] = draw(logarithmic(-9, 1))
+            material["inertial_drag_coefficient"] = draw(st.sampled_from([0.0, 0.4, 100.0]))
         if formulation != "dry":
             material["liquid_bulk_modulus_Pa"] = draw(logarithmic(6, 8.5))
-        for name in [*drained, "porosity_update"] * (formulation != "two_phase") + wet * (formulation == "dry"):
+            if flow["initial_stress"] == "geostatic":
+                flow["initial_pore_pressure_ratio"] = draw(st.one_of(st.none(), pick(0.0, 1.0)))
+        for name in [*drained, "inertial_drag_coefficient", "porosity_update"] * (formulation != "two_phase") + wet * (
+            formulation == "dry"
+        ):
             material.pop(name, None)
         volume = (2 + flow["shape"]["squares"]) * depth**2
         data["barrier"] = {

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from warp_mpm import geometry
 from warp_mpm.discretization import SMALLEST_POINT, fill_polygon, material_points
 from warp_mpm.scenario import Scenario
+from warp_mpm.scenario_errors import ScenarioError
 
 SCENES = Path(__file__).parents[2] / "scenarios"
 
@@ -105,3 +106,28 @@ def test_slope_reduces_the_pressure():
     scenario = Scenario.load(SCENES / "case_1.json")
     flat, tilted = (material_points(scenario.replaced({"gravity.tilt_deg": tilt})) for tilt in (0, 30))
     assert tilted.pore_pressure == pytest.approx(flat.pore_pressure * np.cos(np.radians(30)))
+
+
+@pytest.mark.parametrize("name", ["case_1", "case_1_undrained"])
+@pytest.mark.parametrize("ratio", [0.0, 0.6, 1.0])
+def test_a_pore_pressure_ratio_shares_the_weight(load_scene, name, ratio):
+    tilt = {"gravity.tilt_deg": 20.0, "flow.initial_pore_pressure_ratio": ratio}
+    points = material_points(load_scene(name, **tilt))
+    hydrostatic = material_points(load_scene(name, **tilt | {"flow.initial_pore_pressure_ratio": None}))
+    total = points.pore_pressure - points.effective_stress[:, 1]
+    np.testing.assert_allclose(total, hydrostatic.pore_pressure - hydrostatic.effective_stress[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(points.pore_pressure, ratio * total, atol=1e-9)
+    np.testing.assert_allclose(points.effective_stress[:, 0], 0.66 * points.effective_stress[:, 1], atol=1e-9)
+    np.testing.assert_allclose(hydrostatic.pore_pressure, total / 1.8, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "words"),
+    [
+        ("case_1_dry", {}, "is not allowed in a dry flow"),
+        ("case_1", {"flow.initial_stress": "zero"}, 'is not allowed with flow.initial_stress = "zero"'),
+    ],
+)
+def test_a_pore_pressure_ratio_needs_a_liquid_and_a_weight(load_scene, name, changes, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scene(name, **changes | {"flow.initial_pore_pressure_ratio": 0.5})

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from warp_mpm.effect_rules import effect_rules
+from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
 from warp_mpm.summary import energy_error
 
@@ -134,3 +136,63 @@ def test_explicit_drag_pays_in_steps(load_scene):
     assert implicit["steps_limited_by_wave"] >= implicit["steps"] - 1
     # 0.95 of the uniform-slip limit 2 k n_S rho_S / (n g rho_m) = 2.94e-5 s.
     assert explicit["time_step_max"] == pytest.approx(0.95 * 2.94e-5, rel=0.01)
+
+
+def test_inertial_drag_slows_the_slip_by_its_square(load_scene):
+    """In the middle of a flying block, where nothing is felt of its edges yet: dw/dt = -(a + b w) w has
+    w = a / ((a / w_0 + b) exp(a t) - b). First order in the step."""
+    changes = {"flow.material.hydraulic_conductivity_m_per_s": CONDUCTIVITY}
+    coefficient, duration = 0.1, 0.006
+    permeability = CONDUCTIVITY * 1e-3 / (1000.0 * 9.81)
+    square = 0.125 * 1000.0 * coefficient / np.sqrt(permeability) * (1.0 / 1300.0 + 1.0 / 500.0)
+    start = np.hypot(1.0, 0.5)
+    exact = RATE / ((RATE / start + square) * np.exp(RATE * duration) - square)
+    errors = []
+    for courant_number in (0.4, 0.1):
+        base = {
+            "numerics.spacing_m": 0.5,
+            "numerics.courant_number": courant_number,
+            "gravity.acceleration_m_per_s2": 0.0,
+            "flow.shape": BLOCK,
+            "flow.velocity_m_per_s": [0.0, 0.0],
+            "flow.initial_stress": "zero",
+            "flow.material.inertial_drag_coefficient": coefficient,
+            "output.end_time_s": duration,
+        }
+        simulation = Simulation(load_scene("case_1", **base | changes))
+        simulation.set_points(liquid_velocity=np.tile([1.0, -0.5], (simulation.material_points, 1)))
+        simulation.advance(duration)
+        points = simulation.points()
+        middle = (np.abs(points["position"] - [-10.0, 6.0]) < 0.5).all(axis=1)
+        slip = (points["liquid_velocity"] - points["solid_velocity"])[middle].mean(axis=0)
+        assert slip[1] / slip[0] == pytest.approx(-0.5, rel=1e-3)
+        errors.append(np.hypot(*slip) / exact - 1.0)
+    # Darcy's law alone would leave more than twice as much.
+    assert start * np.exp(-RATE * duration) > 2.0 * exact
+    # A quarter of the step, a quarter of the error; next to nothing remains at a step of zero.
+    assert 0.0 < errors[1] < 0.35 * errors[0]
+    assert abs(4.0 * errors[1] - errors[0]) / 3.0 < 0.02
+
+
+def test_without_inertial_drag_nothing_of_it_is_there(load_scene):
+    plain, dragged = (
+        Simulation(load_scene("case_1", **COARSE | {"flow.material.inertial_drag_coefficient": coefficient}))
+        for coefficient in (0.0, 0.4)
+    )
+    assert "inertial_drag_rate" not in plain._types.Parameters.vars
+    assert "inertial_drag_rate" in dragged._types.Parameters.vars
+    assert plain.effects.module_name in dragged.effects.module_name.replace("-inertial_drag", "")
+
+
+COARSE = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.1}
+
+
+def test_inertial_drag_is_implicit_alone(load_scene):
+    changes = {"numerics.drag": "explicit", "flow.material.inertial_drag_coefficient": 0.4}
+    with pytest.raises(
+        ScenarioError, match=r'inertial_drag_coefficient = 0.4 is not allowed with numerics.drag = "exp'
+    ):
+        load_scene("case_1", **changes)
+    for kept in ({"numerics.drag": "explicit"}, {"flow.material.inertial_drag_coefficient": 0.4}):
+        for rule in effect_rules(load_scene("case_1", **kept)):
+            load_scene("case_1", **kept).replaced(rule.switched)

@@ -336,7 +336,7 @@ def test_what_cannot_be_registered():
     for law, words in ((Own(), "package's own"), (Odd(), "small letters"), (Taken(), "field porosity, which every")):
         with pytest.raises(ValueError, match=words):
             laws.register(law)
-    assert laws.names() == ("mohr_coulomb", "elastic")
+    assert laws.names() == ("mohr_coulomb", "elastic", "herschel_bulkley", "coulomb_viscous", "mu_i")
 
     class Needy(Apic):
         name = "needy"

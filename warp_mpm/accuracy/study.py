@@ -97,15 +97,15 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
         scenario: its numerics are the defaults around which the knobs are turned.
         quick: fewer and coarser.
     """
-    own, base = scenario.numerics.spacing_m, _bare(scenario)
+    own, base, flow = scenario.numerics.spacing_m, _bare(scenario), scenario.flow
     settings = ladder(scenario, [own * factor for factor in (QUICK_SPACINGS if quick else FULL_SPACINGS)])
     shared = refined(
         scenario, [setting.spacing for setting in settings], REFINED_SPACINGS if quick else FULL_REFINED_SPACINGS
     )
     at = own * KNOB_SPACING
     for knob, levels in KNOBS.items():
-        # Other formulations have no drag: nothing to turn there.
-        if knob == "drag" and not isinstance(scenario.flow, TwoPhaseFlow):
+        # Other formulations have no drag, and inertial drag is implicit alone: nothing to turn there.
+        if knob == "drag" and (not isinstance(flow, TwoPhaseFlow) or flow.material.inertial_drag_coefficient > 0.0):
             continue
         for level in levels:
             if level != getattr(scenario.numerics, knob):

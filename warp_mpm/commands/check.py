@@ -16,6 +16,7 @@ def check(
     """Check scenario files and tell what they describe; nothing is run or written."""
     from warp_mpm.caveats import scene_caveats
     from warp_mpm.description import described, described_domain, described_material
+    from warp_mpm.regime import described_regime
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
@@ -25,7 +26,8 @@ def check(
             scenario = Scenario.load(file)
             notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
             card = [*described(scenario), described_material(scenario), described_domain(scenario)]
-            tell("\n  ".join([f"{file}: {scenario.title}", *card, *notes]))
+            told = [*card, described_regime(scenario), *notes]
+            tell("\n  ".join([f"{file}: {scenario.title}", *filter(None, told)]))
         except ScenarioError as error:
             failed = True
             complain(str(error))

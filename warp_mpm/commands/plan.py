@@ -44,6 +44,7 @@ def plan(
         from warp_mpm.description import described_domain
         from warp_mpm.performance.plan import make_plan
         from warp_mpm.performance.plan import what_if as switched
+        from warp_mpm.regime import described_regime, regime
         from warp_mpm.scenario import Scenario
 
         scenario = with_options(Scenario.load(scenario_file), spacing=spacing, until=until)
@@ -60,11 +61,14 @@ def plan(
     if as_json:
         told = asdict(card) | {"wall_time": card.wall_time, "limit": card.limit}
         told |= {name: told[name] if told[name] < float("inf") else None for name in ("drag_step", "law_step")}
+        told["regime"] = {name: value for name, value in regime(scenario).items() if value < float("inf")}
         told["rules"] = [asdict(rule) | {"on": rule.on} for rule in card.rules]
         typer.echo(json.dumps(told | {"what_if": [asdict(switch) for switch in switches]}, indent=2))
         return
     console.print(scenario.title, style="bold")
     console.print(described_domain(scenario), soft_wrap=True)
+    if words := described_regime(scenario):
+        console.print(words, soft_wrap=True)
     for sentence in scene_caveats(scenario):
         console.print(f"Note: {sentence}", soft_wrap=True)
     _print_effects(console, card)

@@ -17,6 +17,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     Parameters = types.Parameters
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
+    INERTIAL_DRAG = effects.inertial_drag
     POROSITY = effects.porosity_update
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
@@ -38,10 +39,20 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         """Exchange momentum between the phases, after their own forces. Per node and direction the two unknowns
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
         Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
-        `coefficient` is Q over its value at the initial porosity."""
+        `coefficient` is Q over its value at the initial porosity, that is n² over its value there.
+
+        With drag b |w| w besides (Forchheimer), |w| at the end of the step obeys |w| (1 + (rate + b |w|) dt) = |w|
+        before."""
         solid_share = F(1.0) / (F(1.0) + parameters.liquid_ratio)
         liquid_share = parameters.liquid_ratio * solid_share
         lost = coefficient * parameters.drag_rate * time_step
+        if INERTIAL_DRAG:
+            slip_x = free[2] - free[0]
+            slip_y = free[3] - free[1]
+            growth = coefficient * wp.sqrt(coefficient) * parameters.inertial_drag_rate * time_step
+            growth *= F(4.0) * wp.sqrt(slip_x * slip_x + slip_y * slip_y)
+            linear = F(1.0) + lost
+            lost += growth / (linear + wp.sqrt(linear * linear + growth)) * F(0.5)
         if IMPLICIT_DRAG:
             lost = lost / (F(1.0) + lost)
         x = lost * (free[2] - free[0])

@@ -231,6 +231,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["liquid_density"] = scalar  # per volume of mixture: n rho_L
         parameters["drag_rate"] = scalar  # 1 / relaxation time of v_L - v_S
         parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
+        if effects.inertial_drag:
+            parameters["inertial_drag_rate"] = scalar  # the same per speed of the slip, of the drag with its square
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4, P)
     contact = contact_fields(effects, scalar, V2, V3) if effects.bodies else {}

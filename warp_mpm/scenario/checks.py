@@ -42,6 +42,23 @@ def problems(scenario: Scenario) -> list[str]:
             'ground = null is not allowed with barrier.shape of the kind "trapezoid", which has no underside and would '
             'lift what flows beneath it; give a ground, or the kind "wall", which has no end below either'
         )
+    inertial = getattr(scenario.flow.material, "inertial_drag_coefficient", 0.0)
+    if scenario.numerics.drag == "explicit" and inertial > 0.0:
+        found.append(
+            f"flow.material.inertial_drag_coefficient = {inertial:g} is not allowed with "
+            'numerics.drag = "explicit"; it must be 0, or the drag "semi_implicit"'
+        )
+    flow = scenario.flow
+    if flow.initial_pore_pressure_ratio is not None and flow.initial_stress == "zero":
+        found.append(
+            f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g} is not allowed with "
+            'flow.initial_stress = "zero"; it must be null'
+        )
+    if flow.initial_pore_pressure_ratio is not None and flow.formulation == "dry":
+        found.append(
+            f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g} is not allowed in a dry flow, "
+            "which has no liquid; it must be null"
+        )
     return found
 
 

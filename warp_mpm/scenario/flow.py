@@ -167,6 +167,9 @@ class TwoPhaseMaterial(UndrainedMaterial):
     """Intrinsic permeability κ, in place of the hydraulic conductivity."""
     liquid_viscosity_Pa_s: Positive = 1e-3
     """Dynamic viscosity μ_L. With the conductivity given it only tells the intrinsic permeability."""
+    inertial_drag_coefficient: NonNegative = 0.0
+    """C_F of the drag that Forchheimer adds to Darcy's, n³ ρ_L C_F |w| w / √κ per volume of mixture, w = v_L - v_S; 0
+    is none, 1.75 / √(150 n³) Ergun's for a bed of grains."""
     porosity_update: bool = False
     """True updates the porosity with the skeleton's volume strain; False keeps it, as the paper does (Eq. (A11))."""
 
@@ -185,6 +188,12 @@ class TwoPhaseMaterial(UndrainedMaterial):
         weight = self.liquid_density_kg_per_m3 * STANDARD_GRAVITY
         return self.intrinsic_permeability_m2 * weight / self.liquid_viscosity_Pa_s
 
+    @property
+    def intrinsic_permeability(self) -> float:
+        """κ [m²], given or from k_sat."""
+        weight = self.liquid_density_kg_per_m3 * STANDARD_GRAVITY
+        return self.hydraulic_conductivity * self.liquid_viscosity_Pa_s / weight
+
 
 class _FlowBase(Model):
     shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")]
@@ -195,6 +204,10 @@ class _FlowBase(Model):
     """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """K0, horizontal over vertical effective stress at t = 0; null: that of the law, as Jaky's 1 - sin φ'."""
+
+    initial_pore_pressure_ratio: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    """λ_p, pore pressure over total vertical stress at t = 0, of a geostatic start with a liquid: 1 where the flow is
+    liquefied; null: hydrostatic."""
 
     material: Skeleton
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -105,6 +106,10 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
             "drag_per_mass": coefficient / solid,
             "drag_rate": coefficient * (1.0 / solid + 1.0 / liquid),
         }
+        if effects.inertial_drag:
+            per_volume = n**3 * material.liquid_density_kg_per_m3 * material.inertial_drag_coefficient
+            per_volume /= math.sqrt(material.intrinsic_permeability)
+            values["inertial_drag_rate"] = per_volume * (1.0 / solid + 1.0 / liquid)
     return values
 
 

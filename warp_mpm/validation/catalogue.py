@@ -16,6 +16,7 @@ from warp_mpm.validation import (
     paper,
     phases,
     refinement,
+    rheology,
     shallow_water,
 )
 from warp_mpm.validation.case import Case
@@ -30,6 +31,7 @@ CASES: tuple[Case, ...] = (
     *jets.CASES,
     *shallow_water.CASES,
     *granular.CASES,
+    *rheology.CASES,
     *case_one.CASES,
     *refinement.CASES,
     *paper.CASES,

@@ -36,8 +36,8 @@ def material(formulation: str, **changes: Any) -> dict[str, Any]:
         fields |= {"liquid_density_kg_per_m3": LIQUID_DENSITY, "liquid_bulk_modulus_Pa": LIQUID_BULK_MODULUS}
     if formulation == "two_phase":
         fields |= {"hydraulic_conductivity_m_per_s": CONDUCTIVITY}
-    if changes.get("law") == "elastic":
-        del fields["friction_angle_deg"]
+    if "law" in changes:
+        del fields["friction_angle_deg"]  # a field of another law
     return fields | changes
 
 

@@ -77,6 +77,23 @@ class Law:
         """What looks like a slip in the material's figures; one sentence each."""
         return []
 
+    def grain_diameter(self, material: Any) -> float | None:
+        """Diameter of the grains [m], where the law asks for it."""
+        return None
+
+    def fluid_viscosity(self, material: Any) -> float | None:
+        """Viscosity of what is between the grains [Pa s], where the law asks for it."""
+        return None
+
+    def dimensionless(self, material: Any, *, rate: float, pressure: float) -> dict[str, float]:
+        """Numbers of its own, by name, of a flow that shears at `rate` [1/s] under an effective pressure [Pa]."""
+        return {}
+
+    def says(self, numbers: Mapping[str, float]) -> str:
+        """What the numbers of a flow (`warp_mpm.regime`) say of this law, in a clause; empty: nothing against another
+        one."""
+        return ""
+
     # -- what a result is held against -----------------------------------------------------------------------------
 
     def strength(self, material: Any) -> float:
