@@ -225,6 +225,7 @@ class Simulation:
             "bodies": self._bodies,
             "contact": self._contact,
             "parameters": self._parameters,
+            "book": self._book,
         }
         self._counts = {"one": 1, "workers": self._workers, "points": self.material_points}
         if self.effects.bodies:
@@ -260,6 +261,9 @@ class Simulation:
             self._contact, self._contact_arrays = contact.structure, contact.arrays
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
+        self._book = self._types.Book()
+        for name in at.BOOK:
+            setattr(self._book, name, self._clock_arrays[name])
         self._clock = self._clock_arrays["clock"]
         self._counters = self._clock_arrays["counters"]
         self._limiters = self._clock_arrays["limiters"]

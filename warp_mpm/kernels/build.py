@@ -30,6 +30,9 @@ CPU_COMPILER_FLAGS = (
 )
 """Warp's own flags without its bound on the depth of vectorisation, and with fused multiply-add."""
 
+LONGEST_UNROLLED = 3
+"""Rounds of the longest loop that is written out in full: over the nodes around a point, not over those of a block."""
+
 CHECKED = os.environ.get("WARP_MPM_CHECKED", "") not in ("", "0")
 """Whether kernels are built for debugging: an index outside its array ends the process, and says so."""
 
@@ -38,7 +41,11 @@ CHECKED = os.environ.get("WARP_MPM_CHECKED", "") not in ("", "0")
 def build_kernels(effects: Effects) -> SimpleNamespace:
     """Kernels for `effects`, and no others, in a Warp module of their own."""
     module = effects.module_name
-    options: dict[str, Any] = {"enable_backward": False, "cpu_compiler_flags": CPU_COMPILER_FLAGS}
+    options: dict[str, Any] = {
+        "enable_backward": False,
+        "cpu_compiler_flags": CPU_COMPILER_FLAGS,
+        "max_unroll": LONGEST_UNROLLED,
+    }
     if CHECKED:
         options["mode"] = "debug"
     wp.set_module_options(options, module=wp.get_module(module))

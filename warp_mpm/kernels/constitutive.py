@@ -60,6 +60,7 @@ def make_constitutive(
     AT_ONCE = effects.skeleton.vectorised
     BODIES = effects.bodies
     Bodies = types.Bodies
+    Book = types.Book
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
     RESTING = not effects.passing
@@ -115,16 +116,13 @@ def make_constitutive(
         grid: Grid,
         parameters: Parameters,
         bodies: Bodies,
-        clock: wp.array(dtype=wp.float64),
-        counters: wp.array(dtype=wp.int32),
-        limiters: wp.array(dtype=wp.float64),
-        left: wp.array(dtype=wp.float64),
+        book: Book,
     ):
         """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
         p = wp.tid()
         if read(points.inside, p) == 0:
             return
-        time_step = F(clock[wp.static(TIME_STEP)])
+        time_step = F(book.clock[wp.static(TIME_STEP)])
         shift = F(grid.shift[0])
         x = read(points.position, p)
         if CORNERS:
@@ -173,7 +171,7 @@ def make_constitutive(
                         pushed = set_back(bodies.pieces, first_piece, last_piece, seen, F(-0.5) * parameters.spacing)
                         if pushed[0] != F(0.0) or pushed[1] != F(0.0):
                             x += pushed
-                            wp.atomic_add(counters, wp.static(POINTS_PUSHED), 1)
+                            wp.atomic_add(book.counters, wp.static(POINTS_PUSHED), 1)
                 sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
                 sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
                 within = (
@@ -185,11 +183,11 @@ def make_constitutive(
         if not within:
             # A position that is no number compares false above; such a point has not left, the run has diverged.
             if wp.isfinite(x[0]) and wp.isfinite(x[1]):
-                leave(points, p, x, parameters, left)
-                wp.atomic_add(counters, wp.static(POINTS_LEFT), 1)
+                leave(points, p, x, parameters, book.left)
+                wp.atomic_add(book.counters, wp.static(POINTS_LEFT), 1)
             else:
                 x = before
-                counters[wp.static(DIVERGED)] = 1
+                book.counters[wp.static(DIVERGED)] = 1
         write(points.position, p, x)
 
         if SOLID_GAP:
@@ -198,7 +196,7 @@ def make_constitutive(
                 largest = room(read(points.smooth, p)[0])
                 if gap > largest:
                     write(points.solid_gap, p, largest)
-                    wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+                    wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     @wp.func
     def settle(
@@ -303,12 +301,7 @@ def make_constitutive(
                 write(points.solid_gap, p, gap)
 
     @wp.kernel(module=module)
-    def bound(
-        points: Points,
-        parameters: Parameters,
-        clock: wp.array(dtype=wp.float64),
-        limiters: wp.array(dtype=wp.float64),
-    ):
+    def bound(points: Points, parameters: Parameters, book: Book):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
         p = wp.tid()
         if read(points.inside, p) == 0:
@@ -320,20 +313,20 @@ def make_constitutive(
             v = read(points.velocity, p)
             gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
             speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
-            wp.atomic_max(clock, wp.static(SPEED_MAX), speed * speed)
-            wp.atomic_add(limiters, wp.static(VOIDS_CLOSED), wp.float64(1.0))
+            wp.atomic_max(book.clock, wp.static(SPEED_MAX), speed * speed)
+            wp.atomic_add(book.limiters, wp.static(VOIDS_CLOSED), wp.float64(1.0))
         if LIQUID_GAP:
             if read(points.liquid_strain, p) > F(0.0):
                 largest = room(read(points.smooth, p)[0]) / parameters.porosity
                 if read(points.liquid_strain, p) > largest:
                     write(points.liquid_strain, p, largest)
-                    wp.atomic_add(limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+                    wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
     if not AT_ONCE:
 
         @wp.kernel(module=module)
-        def yielding(points: Points, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+        def yielding(points: Points, parameters: Parameters, book: Book):
             """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
             p = wp.tid()
             gap = F(0.0)
@@ -346,7 +339,7 @@ def make_constitutive(
                 read(points.gradient, p),
                 read(points.volume, p),
                 gap,
-                F(clock[wp.static(TIME_STEP)]),
+                F(book.clock[wp.static(TIME_STEP)]),
                 parameters,
             )
 

@@ -53,6 +53,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     Parameters = types.Parameters
     Contact = types.Contact
     Bodies = types.Bodies
+    Book = types.Book
     MOVING = effects.moving
     SLIDING = effects.sliding
     TWO_PHASE = effects.two_phase
@@ -440,22 +441,21 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         bodies: Bodies,
         grid: Grid,
         parameters: Parameters,
-        clock: wp.array(dtype=wp.float64),
-        reactions: wp.array(dtype=wp.float64),
+        book: Book,
     ):
         """Places that share no node with another, of bodies whose velocity is known."""
         group = wp.tid()
         block = contact.block[group]
         bi = block / parameters.block_rows
         if grid.block[bi, block - bi * parameters.block_rows] != 0:
-            time_step = F(clock[wp.static(TIME_STEP)])
+            time_step = F(book.clock[wp.static(TIME_STEP)])
             for e in range(contact.start[group], contact.start[group + 1]):
                 inverse = inverse_mass(contact, e, grid, parameters)
                 if inverse > F(0.0):
                     contact.inverse[e] = inverse
                     recall(contact, e, F(0.0))
                     relax(contact, e, bodies, grid, parameters, time_step)
-                    finish(contact, e, grid, parameters, time_step, reactions)
+                    finish(contact, e, grid, parameters, time_step, book.reactions)
 
     kernels = SimpleNamespace(press=press)
     if not effects.joined:
@@ -472,14 +472,12 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         bodies: Bodies,
         grid: Grid,
         parameters: Parameters,
-        clock: wp.array(dtype=wp.float64),
-        counters: wp.array(dtype=wp.int32),
-        reactions: wp.array(dtype=wp.float64),
+        book: Book,
     ):
         """Places that share nodes, together, and with them the bodies that slide. One block of threads: those of one
         colour share no node."""
         lane = wp.tid()
-        dt = clock[wp.static(TIME_STEP)]
+        dt = book.clock[wp.static(TIME_STEP)]
         time_step = F(dt)
         again = wp.float64(0.0)
         if contact.last[0] > wp.float64(0.0):
@@ -528,14 +526,14 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         for c in range(contact.colours):
             for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
                 if contact.inverse[e] > F(0.0):
-                    finish(contact, e, grid, parameters, time_step, reactions)
+                    finish(contact, e, grid, parameters, time_step, book.reactions)
             meet()
         if lane == 0:
             go_on(bodies, grid, parameters, time_step)
             if SLIDING:
-                wp.atomic_add(counters, wp.static(BARRIER_ITERATIONS), sweep)
+                wp.atomic_add(book.counters, wp.static(BARRIER_ITERATIONS), sweep)
                 if sweep == wp.static(MOST):
-                    wp.atomic_add(counters, wp.static(BARRIER_UNCONVERGED), 1)
+                    wp.atomic_add(book.counters, wp.static(BARRIER_UNCONVERGED), 1)
 
     kernels.join = join
     return kernels

@@ -15,6 +15,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
+    Book = types.Book
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     INERTIAL_DRAG = effects.inertial_drag
@@ -60,10 +61,10 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         return free + V(liquid_share * x, liquid_share * y, -solid_share * x, -solid_share * y)
 
     @wp.kernel(module=module)
-    def move(grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+    def move(grid: Grid, parameters: Parameters, book: Book):
         """From the momentum of every node in use to its velocity."""
         worker = wp.tid()
-        time_step = F(clock[wp.static(TIME_STEP)])
+        time_step = F(book.clock[wp.static(TIME_STEP)])
         g = parameters.gravity
         gravity = V()
         if TWO_PHASE:

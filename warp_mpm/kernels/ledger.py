@@ -37,6 +37,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     BODIES = effects.bodies
     MOVING = effects.moving
     Bodies = types.Bodies
+    Book = types.Book
 
     one = wp.constant(wp.float64(1.0))
 
@@ -66,7 +67,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         return result
 
     @wp.kernel(module=module)
-    def ledger(points: Points, parameters: Parameters, bodies: Bodies, sums: wp.array(dtype=wp.float64)):
+    def ledger(points: Points, parameters: Parameters, bodies: Bodies, book: Book):
         solid_mass = wp.float64(0.0)
         liquid_mass = wp.float64(0.0)
         kinetic_energy = wp.float64(0.0)
@@ -141,18 +142,18 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                 solid_mass += wp.float64(solid)
                 speed_max = larger(speed_max, wp.float64(speed))
             p += parameters.workers
-        wp.atomic_add(sums, wp.static(LEDGER_SOLID_MASS), solid_mass)
-        wp.atomic_add(sums, wp.static(LEDGER_KINETIC), kinetic_energy)
-        wp.atomic_add(sums, wp.static(LEDGER_GRAVITATIONAL), gravitational_energy)
-        wp.atomic_add(sums, wp.static(LEDGER_ELASTIC), elastic_energy)
-        wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_X), momentum_x)
-        wp.atomic_add(sums, wp.static(LEDGER_MOMENTUM_Y), momentum_y)
-        wp.atomic_max(sums, wp.static(LEDGER_SPEED_MAX), speed_max)
-        wp.atomic_add(sums, wp.static(LEDGER_NOT_FINITE), not_finite)
+        wp.atomic_add(book.sums, wp.static(LEDGER_SOLID_MASS), solid_mass)
+        wp.atomic_add(book.sums, wp.static(LEDGER_KINETIC), kinetic_energy)
+        wp.atomic_add(book.sums, wp.static(LEDGER_GRAVITATIONAL), gravitational_energy)
+        wp.atomic_add(book.sums, wp.static(LEDGER_ELASTIC), elastic_energy)
+        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_X), momentum_x)
+        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_Y), momentum_y)
+        wp.atomic_max(book.sums, wp.static(LEDGER_SPEED_MAX), speed_max)
+        wp.atomic_add(book.sums, wp.static(LEDGER_NOT_FINITE), not_finite)
         if TWO_PHASE:
-            wp.atomic_add(sums, wp.static(LEDGER_LIQUID_MASS), liquid_mass)
+            wp.atomic_add(book.sums, wp.static(LEDGER_LIQUID_MASS), liquid_mass)
         if LIQUID:
-            wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MAX), pressure_max)
-            wp.atomic_max(sums, wp.static(LEDGER_PRESSURE_MEAN), pressure_mean)
+            wp.atomic_max(book.sums, wp.static(LEDGER_PRESSURE_MAX), pressure_max)
+            wp.atomic_max(book.sums, wp.static(LEDGER_PRESSURE_MEAN), pressure_mean)
 
     return SimpleNamespace(ledger=ledger)

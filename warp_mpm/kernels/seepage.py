@@ -12,9 +12,10 @@ def make_seepage(types: SimpleNamespace, module: str) -> SimpleNamespace:
     F = types.scalar
     Grid = types.Grid
     Parameters = types.Parameters
+    Book = types.Book
 
     @wp.kernel(module=module)
-    def seep(grid: Grid, parameters: Parameters, balance: wp.array(dtype=wp.float64)):
+    def seep(grid: Grid, parameters: Parameters, book: Book):
         """Its rate at the end of the step [W/m]: g . sum m_L (v_L - v_S), over the nodes, which have all momentum."""
         worker = wp.tid()
         slip = wp.vec2d()
@@ -31,6 +32,6 @@ def make_seepage(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     liquid = mass * parameters.liquid_ratio
                     slip += wp.vec2d(wp.float64(liquid * (v[2] - v[0])), wp.float64(liquid * (v[3] - v[1])))
         g = wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
-        wp.atomic_add(balance, wp.static(SEEPAGE_POWER), wp.dot(g, slip))
+        wp.atomic_add(book.balance, wp.static(SEEPAGE_POWER), wp.dot(g, slip))
 
     return SimpleNamespace(seep=seep)

@@ -64,6 +64,7 @@ def make_transfer(
     MOVING = effects.moving
     RESTING = not effects.passing
     Bodies = types.Bodies
+    Book = types.Book
     POROSITY = effects.porosity_update
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     pressure_at = pore.pressure
@@ -108,7 +109,7 @@ def make_transfer(
                 grid.active[place] = block
 
     @wp.kernel(module=module)
-    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, clock: wp.array(dtype=wp.float64)):
+    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
         """Mass, momentum and internal force of the points to the nodes, the latter two of each phase.
 
         Internal forces per node: solid -sum V (sigma' - (1 - n) p I) grad w, liquid +sum V n p grad w, with p
@@ -136,7 +137,7 @@ def make_transfer(
             masses = V(mass, mass, liquid_mass, liquid_mass)
         else:
             masses = V(mass, mass)
-        time_step = F(clock[wp.static(TIME_STEP)])
+        time_step = F(book.clock[wp.static(TIME_STEP)])
         gravity = V()
         if TWO_PHASE:
             gravity = V(parameters.gravity[0], parameters.gravity[1], parameters.gravity[0], parameters.gravity[1])
@@ -252,14 +253,14 @@ def make_transfer(
         return wp.float64(result)
 
     @wp.kernel(module=module)
-    def gather(points: Points, grid: Grid, parameters: Parameters, clock: wp.array(dtype=wp.float64)):
+    def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
         """Velocities and velocity gradient from the nodes to the points; volume strain rates to the corners."""
         p = wp.tid()
         if read(points.inside, p) == 0:
             return
         x = read(points.position, p)
         shift = F(grid.shift[0])
-        time_step = F(clock[wp.static(TIME_STEP)])
+        time_step = F(book.clock[wp.static(TIME_STEP)])
         ci, cj, fx, fy = cell_of(x, shift, parameters)
         first = (ci - 1) * parameters.rows + cj - 1
         wx = weights(fx)
@@ -287,8 +288,8 @@ def make_transfer(
         velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
         fastest = speed_squared(velocity)
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
-        if fastest > clock[wp.static(SPEED_MAX)]:
-            wp.atomic_max(clock, wp.static(SPEED_MAX), fastest)
+        if fastest > book.clock[wp.static(SPEED_MAX)]:
+            wp.atomic_max(book.clock, wp.static(SPEED_MAX), fastest)
 
         # The points move by v dt with the velocity that they have now, which is that of the middle of the step. Its
         # gradient there is L (I + dt L / 2)^-1 of the gradient L at the places where the step began (Hughes and

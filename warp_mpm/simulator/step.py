@@ -8,13 +8,13 @@ from ..effects import Effects
 from .launch import Launch
 
 START = Launch("start", "one", ("parameters", "clock", "counters", "running", "bodies", "grid"), "begins an interval")
-LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "sums"), "sums over the points, for a sample")
+LEDGER = Launch("ledger", "workers", ("points", "parameters", "bodies", "book"), "sums over the points, for a sample")
 
 
 def launches(effects: Effects) -> tuple[Launch, ...]:
     """The kernels of a step for `effects`, in their order; a scheme's own ones stand where it says."""
-    grid = ("grid", "parameters", "clock")
-    points = ("points", "grid", "parameters", "bodies", "clock")
+    grid = ("grid", "parameters", "book")
+    points = ("points", "grid", "parameters", "bodies", "book")
     step = [
         Launch("clear", "workers", ("grid", "parameters"), "empties the blocks that were in use"),
         Launch("forget", "one", ("grid",), "empties their list"),
@@ -23,28 +23,20 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     ]
     seen = ("contact", "bodies", *grid)
     if effects.bodies:
-        step.append(
-            Launch("press", "groups", (*seen, "reactions"), "contact at places that share no node with another")
-        )
+        step.append(Launch("press", "groups", seen, "contact at places that share no node with another"))
     if effects.joined:
-        step.append(
-            Launch("join", "lanes", (*seen, "counters", "reactions"), "contact at all others, and bodies that slide")
-        )
+        step.append(Launch("join", "lanes", seen, "contact at all others, and bodies that slide"))
     if effects.two_phase:
-        step.append(
-            Launch(
-                "seep", "workers", ("grid", "parameters", "balance"), "rate at which gravity works on liquid that seeps"
-            )
-        )
+        step.append(Launch("seep", "workers", grid, "rate at which gravity works on liquid that seeps"))
     step.append(Launch("gather", "points", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
-    takes = ("points", "parameters", "clock")
+    takes = ("points", "parameters", "book")
     step += [
-        Launch("advect", "points", (*points, "counters", "limiters", "left"), "moves the points"),
-        Launch("update", "points", takes, "strain, effective stress and pore pressure"),
+        Launch("advect", "points", points, "moves the points"),
+        Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
         *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
-        Launch("bound", "points", (*takes, "limiters"), "limits that few points come to"),
+        Launch("bound", "points", takes, "limits that few points come to"),
         Launch(
             "tick",
             "one",
