@@ -76,25 +76,24 @@ SAFEGUARDS = (
 )
 
 KNOWN_LIMITS = (
-    "Inclined faces are met by nodes, within half a cell of them: the zone in which no node moves begins, as a face "
-    "crosses the grid, at the face or up to a cell behind it. Points under pressure creep in, up to half a cell, from "
-    "where they are set back (most in `one_point_wide`, `dry_20` and `face_89`); that halves with the spacing, in "
-    "metres. Level and upright surfaces on the lines of the grid are exact. To stop a node by its share of the cell "
-    "would not mend it: done in each step, any share soon stops all of the flow there.",
-    "`low_barrier`, four cells high under twelve of flow: the barrier slides 9.0, 10.3 and 11.8 m at Courant numbers "
-    "of 0.95, 0.48 and 0.24, with FLIP 8.9, 9.6 and 9.4 m. The affine transfer filters, once per step, what is not "
-    "affine over a cell, and the layer that shears over the crest is one or two cells thick. At the default step the "
-    "two transfers agree to 1 %.",
-    "At 0.5 m, the peak force of `dry_friction_0`, `face_89` and `wall` changes by 5.1 to 5.3 % when the time step is "
-    "halved, and the displacement of `explicit_drag` by 6.2 %; at 0.25 m, as they are in the collection, by 0.6 to 1.1 "
-    "and 3.3 %.",
-    "Pressures of points scatter about their cells' by more than a quarter of the signal in water of 2.2 GPa "
-    "(`bulk_modulus_2e9`, 0.29), where a thin jet lands (`falling_jet`, 0.32), and on two cells of depth (`thin_flow`, "
-    "0.26).",
+    "An inclined face acts at points along it, two to a cell, on what the nodes around see; a single point may pass "
+    "between. Under pressure that lasts, points creep in, up to half a cell, from where they are set back: of a pool that "
+    "rests for a minute (`at_rest_60s`) 0.5 % of the points, of a soft block without cohesion that FLIP scatters "
+    "(`flip_soft`) 0.1 %. That halves with the spacing, in metres. Level and upright surfaces on the lines of the grid "
+    "are exact.",
+    "When the time step is halved, the barrier's displacement changes by more than 2 % in `explicit_drag` (4.1 %), "
+    "`elastic_spray` (2.6 %), `odd_spacing`, `friction_angle_45` and `conductivity_1e-9` (2.1 to 2.2 %), all at 0.4 or "
+    "0.5 m. It is what is left of two large impulses, that of the flow and that of the base, and shows ten times the "
+    "error of either; at 0.2 m the same halving changes it by 0.4 % in case 1. The filtered peak force changes by 4.8 % "
+    "where three points hit the barrier (`one_point`), by 2.6 % where a soft dry block does (`dry_soft_45`), and by 17 % "
+    "with FLIP (`flip_soft`).",
+    "Pressures of points scatter about their cells' by more than a quarter of the signal where a thin jet lands "
+    "(`falling_jet`, 0.28), in the tip of a wedge that closes (`closing_wedge`, 0.28), and before a wall that is shaken at "
+    "a fifth of the flow's depth (`driven_shaken`, 0.43).",
     "Mud that hardly yields (`mud_yield_1e6`, `mud_viscosity_1e6`) hits the barrier as an elastic block does: its "
     "pressure varies within a cell at toe and crest, by up to 0.29 of the signal.",
-    "FLIP keeps velocities of points that the grid does not see. Where the flow is faster than sound (`flip_soft`), a "
-    "point's own velocity grows to 1.4 times the bound while it moves with the rest, and 1.1 % of the energy appears.",
+    "FLIP keeps velocities of points that the grid does not see, and no affine field: where the flow is faster than sound "
+    "(`flip_soft`), what single points do depends on the step.",
     "Where a jet lands, single points meet the ground at up to 0.6 of the bound that their water hammer sets, for a "
     "few milliseconds. The figure `pore_pressure_max` leaves them out, `pore_pressure_max_anywhere` holds them.",
     "The skeleton's law is linear in the density. A soft one (0.1 MPa) under a fast impact or under its own weight is "
@@ -109,14 +108,19 @@ KNOWN_LIMITS = (
 """Found by the collection and not mended."""
 
 KNOWN_FAILURES = {
-    "bulk_modulus_2e9": frozenset({"pressure_noise", "halving_displacement"}),
-    "dry_20": frozenset({"pushed_share"}),
+    "at_rest_60s": frozenset({"pushed_share"}),
+    "closing_wedge": frozenset({"pressure_noise"}),
+    "conductivity_1e-9": frozenset({"halving_displacement"}),
+    "driven_shaken": frozenset({"pressure_noise"}),
+    "dry_soft_45": frozenset({"halving_peak_force"}),
+    "elastic_spray": frozenset({"halving_displacement"}),
+    "explicit_drag": frozenset({"halving_displacement"}),
     "falling_jet": frozenset({"pressure_noise"}),
-    "flip_soft": frozenset({"energy_error", "speed_ratio", "halving_peak_force"}),
-    "low_barrier": frozenset({"halving_displacement"}),
+    "flip_soft": frozenset({"halving_peak_force", "pushed_share"}),
+    "friction_angle_45": frozenset({"halving_displacement"}),
     "mud_viscosity_1e6": frozenset({"pressure_noise"}),
     "mud_yield_1e6": frozenset({"pressure_noise"}),
-    "one_point_wide": frozenset({"pushed_share"}),
-    "thin_flow": frozenset({"pressure_noise"}),
+    "odd_spacing": frozenset({"halving_displacement"}),
+    "one_point": frozenset({"halving_peak_force"}),
 }
 """Criteria that a case is known not to meet, each explained in `KNOWN_LIMITS`."""
