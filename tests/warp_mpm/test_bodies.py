@@ -141,7 +141,8 @@ def acting(simulation, name):
 def test_a_body_that_passes_acts_at_its_outline():
     """The splines' weights give back where a place lies, for a pillar that has moved across the grid."""
     pillar = Body("pillar", Outline(0.7 * CIRCLE + [0.0, 3.5]), motion=Driven((0.0,), ((3.0, -1.0),)))
-    simulation = basin(bodies=[pillar])
+    beside = Body("block", block(4.03, 5.0, 1.5), motion=Sliding(2000.0, 0.1))
+    simulation = basin(bodies=[pillar, beside], domain={"left_m": -8.0, "right_m": 12.0, "top_m": 6.0})
     for time in (0.03, 0.2):
         simulation.advance(time)
         # As it lay at the begin of the last step.
@@ -288,7 +289,7 @@ def test_a_second_barrier_stays_while_the_grid_rides_with_the_first(load_scene):
 def test_a_plate_pushes_a_pool():
     """A piston, driven by a function: it goes where it is told, and its work is force times way."""
     plate = Body(
-        "plate", block(-4.5, -4.0, 4.0),
+        "plate", block(-4.5, -4.0, 4.0), (Surface("plate", 0.2),),
         motion=Driven.function(lambda t: (0.5 * np.sin(np.pi * t), 0.0), np.linspace(0.0, 1.0, 101)),
     )  # fmt: skip
     simulation = basin("two_phase", bodies=[plate], domain={"left_m": -8.0, "right_m": 4.0, "top_m": 6.0,
@@ -345,7 +346,7 @@ def test_the_script_of_the_guide(tmp_path):
 
 
 def test_without_bodies_there_is_nothing_of_them():
-    flying = scene("flies", box(0.0, 1.0, 1.0), "undrained", end_time=0.1, ground=None, spacing_m=0.25)
+    flying = scene("flies", box(0.0, 1.0, 1.0), "two_phase", end_time=0.1, ground=None, spacing_m=0.25)
     simulation = Simulation(flying)
     simulation.advance(0.01)
     assert not [name for name in simulation.arrays if name.startswith(("bodies", "contact"))]

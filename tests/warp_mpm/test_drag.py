@@ -27,6 +27,8 @@ def flying_block(load_scene, drag, courant_number):
         "flow.initial_stress": "zero",
         "flow.material.hydraulic_conductivity_m_per_s": CONDUCTIVITY,
         "output.end_time_s": DURATION,
+        "barrier": None,
+        "ground": None,
     }
     simulation = Simulation(load_scene("case_1", **changes))
     number = simulation.material_points

@@ -227,8 +227,8 @@ COARSE = {"numerics.spacing_m": 0.5, "output.end_time_s": 1.0}
 WITHOUT_INFLUENCE = {
     "yield stress far beyond reach": (
         "case_1_dry",
-        {"flow.material.cohesion_Pa": 1e12, "flow.material.tension_cutoff_Pa": 1e12},
-        with_law(Scenario.load(SCENES / "case_1_dry.json"), "elastic"),
+        {"flow.material.cohesion_Pa": 1e12, "flow.material.tension_cutoff_Pa": 1e12, "barrier.friction": 0.0},
+        with_law(Scenario.load(SCENES / "case_1_dry.json"), "elastic") | {"barrier.friction": 0.0},
         1e-9,
         1.0,
     ),
@@ -242,7 +242,7 @@ WITHOUT_INFLUENCE = {
         0.35,
     ),
     "ground friction of next to nothing": (
-        "case_1",
+        "case_1_fixed",
         {"barrier.friction": 0.0, "ground.friction": 1e-13},
         {"barrier.friction": 0.0},
         1e-9,
