@@ -76,19 +76,19 @@ SAFEGUARDS = (
 )
 
 KNOWN_LIMITS = (
-    "An inclined face acts at points along it, two to a cell, on what the nodes around see; a single material point may "
-    "pass between. Under pressure that lasts, points creep in, up to half a cell, from where they are set back: in 0.5 % "
+    "An inclined face acts at points along it, two to a cell, on what the nodes around see; a single material point "
+    "may pass between. Under pressure that lasts, points creep in, up to half a cell, and are set back there: in 0.5 % "
     "of the points and steps of a pool that rests for a minute (`at_rest_60s`), in 0.1 % of a soft block in FLIP "
     "(`flip_soft`). Level and upright surfaces on the lines of the grid are exact.",
     "When the time step is halved, the barrier's displacement changes by more than 2 % in `explicit_drag` (4.1 %), "
     "`elastic_spray` (2.6 %), `odd_spacing`, `friction_angle_45` and `conductivity_1e-9` (2.1 to 2.2 %). It is what is "
     "left of two large impulses, that of the flow and that of the base, and shows ten times the error of either. The "
     "last four have cells of 0.4 or 0.5 m: case 1 changes by 2.0 % at 0.4 m and by 0.4 % at 0.2 m. The filtered peak "
-    "force changes by 4.8 % where three points hit the barrier (`one_point`), by 2.6 % where a soft dry block does "
+    "force changes by 4.8 % where one point hits the barrier (`one_point`), by 2.6 % where a soft dry block does "
     "(`dry_soft_45`), and by 17 % with FLIP (`flip_soft`).",
     "Pressures of points scatter about their cells' by more than a quarter of the signal where a thin jet lands "
-    "(`falling_jet`, 0.28), in the tip of a wedge that closes (`closing_wedge`, 0.28), and before a barrier that is shaken "
-    "at 10 Hz (`driven_shaken`, 0.43).",
+    "(`falling_jet`, 0.28), in the tip of a wedge that closes (`closing_wedge`, 0.28), and before a barrier that is "
+    "shaken at 10 Hz (`driven_shaken`, 0.43).",
     "Mud that hardly yields (`mud_yield_1e6`, `mud_viscosity_1e6`) hits the barrier as an elastic block does: its "
     "pressure varies within a cell at toe and crest, by up to 0.29 of the signal.",
     "FLIP keeps velocities of points that the grid does not see, and no affine field: where the flow is faster than "
