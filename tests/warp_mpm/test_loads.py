@@ -253,6 +253,7 @@ def test_the_headline_has_the_patch_and_not_the_cell():
     summary |= {"pressure_patch_max": 4e5, "pressure_patch_max_time": 0.2, "pressure_patch_max_height": 0.25}
     rows = dict(summary_rows(summary))
     assert rows["greatest pressure on the face"] == "400.0 kPa at 0.200 s, 0.25 m up"
+    assert dict(summary_rows(summary | {"peak_force_height": 1.234}))["  acting at a height of"] == "1.23 m"
     assert rows["  as a mean over"] == "0.5 m and 0.02 s"
     assert not any("in a cell" in name for name in rows)
 
