@@ -165,6 +165,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     rows = [
         (words("peak_force_filtered"), told("peak_force_filtered", at="peak_force_filtered_time")),
         ("  over one record", told("peak_force", at="peak_force_time")),
+        ("  acting at a height of", told("peak_force_height", ",.2f")),
         (words("impulse"), told("impulse")),
         (words("impact_start_time"), told("impact_start_time", ",.3f")),
         (

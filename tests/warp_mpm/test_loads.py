@@ -110,6 +110,24 @@ def test_slots_add_up_to_the_reactions(load_scene, name):
     assert pressed > 0.0
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"gravity.acceleration_m_per_s2": 0.0},
+        {"barrier.motion": {"kind": "prescribed", "times_s": [0.0, 9.0], "velocities_m_per_s": [0.0, -2.0]}},
+    ],
+)
+def test_a_state_fits_a_longer_run_before_a_wall(load_scene, changes):
+    """The slots of a wall without end hang on the scene, not on the grid that a later end calls for."""
+    short, long = (
+        Simulation(load_scene("case_5", **{"numerics.spacing_m": 0.75, "output.end_time_s": end} | changes))
+        for end in (0.5, 5.0)
+    )
+    assert len(short.slots) == len(long.slots)
+    assert short.slots.face.heights.tolist() == long.slots.face.heights.tolist()
+
+
 def test_what_the_flow_does_not_touch_takes_nothing(load_scene):
     simulation = Simulation(load_scene("case_1", **{"numerics.spacing_m": 0.75}))
     simulation.advance(0.2)
@@ -253,6 +271,7 @@ def test_the_headline_has_the_patch_and_not_the_cell():
     summary |= {"pressure_patch_max": 4e5, "pressure_patch_max_time": 0.2, "pressure_patch_max_height": 0.25}
     rows = dict(summary_rows(summary))
     assert rows["greatest pressure on the face"] == "400.0 kPa at 0.200 s, 0.25 m up"
+    assert dict(summary_rows(summary | {"peak_force_height": 1.234}))["  acting at a height of"] == "1.23 m"
     assert rows["  as a mean over"] == "0.5 m and 0.02 s"
     assert not any("in a cell" in name for name in rows)
 

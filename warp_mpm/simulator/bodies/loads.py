@@ -15,8 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.extent import barrier_travel
-from warp_mpm.scenario import Scenario, Trapezoid
+from warp_mpm.scenario import Prescribed, Scenario, Trapezoid
 
 from .body import Body
 from .of_scene import BARRIER
@@ -152,7 +151,7 @@ def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> Slots | None:
 
 def _ends(scenario: Scenario, begins: Array) -> list[tuple[float, float]]:
     """Where each surface begins and ends along itself [m]. A wall has no end; what the flow would reach with twice its
-    energy is divided."""
+    energy is divided, however long the run."""
     assert scenario.barrier is not None
     shape, flow = scenario.barrier.shape, scenario.flow
     if isinstance(shape, Trapezoid):
@@ -160,7 +159,9 @@ def _ends(scenario: Scenario, begins: Array) -> list[tuple[float, float]]:
         # A crest without width still has a slot, of no length to speak of.
         return [(0.0, max(float(np.hypot(*(b - a))), 1e-9)) for a, b in pairwise(corners)]
     (low, high), g = (flow.polygon[:, 1].min(), flow.polygon[:, 1].max()), -scenario.gravity.vector[1]
-    speed = flow.speed + barrier_travel(scenario).speed
-    reach = flow.depth + (speed**2 / g if g > 0.0 else speed * scenario.output.end_time_s)
+    motion, speed = scenario.barrier.motion, flow.speed
+    if isinstance(motion, Prescribed):
+        speed += max(abs(velocity) for velocity in motion.velocities_m_per_s)
+    reach = flow.depth + (speed**2 / g if g > 0.0 else 10.0 * flow.depth)
     low = 0.0 if scenario.ground is not None else float(low) - reach
     return [(low - float(begins[0, 1]), float(high) + reach - float(begins[0, 1]))]
