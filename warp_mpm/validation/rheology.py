@@ -487,7 +487,7 @@ def laws(quick: bool) -> Outcome:
             results.snapshots.close()
             for values, value in zip(figures.values(), found, strict=True):
                 values.append(float(value))
-            rows.append((name, *(f"{value:.3g}" for value in found), str(summary["impact_mechanism"])))
+            rows.append((name, *(f"{value:.3g}" for value in found), str(summary["mechanism"])))
     checks = [
         reported(f"{figure}: greatest over least of all laws", "-", max(values) / min(values))
         for figure, values in figures.items()
