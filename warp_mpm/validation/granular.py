@@ -183,8 +183,8 @@ def collapse_by_rate(quick: bool) -> Outcome:
             "One set of parameters meets the bands of all four ratios, but it is not the material's: its static "
             "friction is that of a slope of 11°, its grains are a twentieth of the column's width, and its heaps are a "
             "third too low at the wall. With figures of real beads the low columns, which a single angle of friction "
-            "stops early, come into the band, and the tallest one still runs 13 % too far. The two laws that bound the band "
-            "were fitted to experiments that differ by half among themselves."
+            "stops early, come into the band, and the tallest one still runs 13 % too far. The two laws that bound the "
+            "band were fitted to experiments that differ by half among themselves."
         ],
     )
 
