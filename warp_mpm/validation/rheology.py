@@ -576,5 +576,6 @@ CASES = (
         source="none: reported",
         limit="reported",
         run=laws,
+        in_quick=False,
     ),
 )
