@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from warp_mpm.effect_rules import derive_effects, effect_rules
+from warp_mpm.effect_rules import derive_effects, effect_rules, with_law
 from warp_mpm.performance import two_devices
-from warp_mpm.performance.benchmark import SHORT, _ladder
+from warp_mpm.performance.benchmark import OWN_FIELDS, SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
 from warp_mpm.performance.table import Table, put_into_page
@@ -15,6 +15,7 @@ from warp_mpm.performance.whole_runs import recording_shares
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.plotting import save
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.laws import LAWS
 
 
 def test_the_yardstick_conserves_momentum():
@@ -55,6 +56,13 @@ def test_the_ladder_adds_one_effect_at_a_time(load_scene):
     assert changed[4] == {"joined"}
     assert changed[9] == {"formulation", "drag"}
     assert len(scenes) == 15
+
+
+def test_the_cost_of_every_law_is_measured(load_scene):
+    assert tuple(OWN_FIELDS) == LAWS.names
+    scene = load_scene("case_1")
+    for law, own in OWN_FIELDS.items():
+        assert derive_effects(scene.replaced(with_law(scene, law, **own))).law == law
 
 
 def test_cost_follows_the_points_and_not_the_domain(load_scene):

@@ -55,7 +55,7 @@ def benchmark(
     from rich.table import Table as Shown
 
     with refusals():
-        from warp_mpm.performance.benchmark import CASE, effect_costs, machine, speed_tables
+        from warp_mpm.performance.benchmark import CASE, effect_costs, law_costs, machine, speed_tables
         from warp_mpm.performance.chart import effects_chart
         from warp_mpm.performance.table import Table as Made
         from warp_mpm.performance.table import put_into_page
@@ -87,6 +87,7 @@ def benchmark(
                 before = ratio
             columns = ("effects, one more each", "yardsticks", "added", "ns per point and step")
             tables = [Made("effects", "Cost of each effect, added to those above it", columns, rows)]
+            tables.append(law_costs(base, device=device, progress=told))
             if out is not None:
                 save(effects_chart(costs), out / "effects.png")
         for table in tables:

@@ -56,6 +56,34 @@ def effect_costs(base: Scenario, *, device: str, progress: Progress) -> list[tup
     return [(name, cost / costs[0], cost) for (name, _), cost in zip(named, costs[1:], strict=True)]
 
 
+OWN_FIELDS: dict[str, dict[str, Any]] = {
+    "mohr_coulomb": {"friction_angle_deg": 20.0},
+    "elastic": {},
+    "herschel_bulkley": {"yield_stress_Pa": 500.0, "consistency_Pa_s": 20.0, "flow_exponent": 0.5},
+    "coulomb_viscous": {"friction_angle_deg": 20.0, "mixture_viscosity_Pa_s": 200.0},
+    "mu_i": {"static_friction": 0.38, "dynamic_friction": 0.64, "grain_diameter_m": 0.01},
+}
+"""Fields of each law where its cost is measured."""
+
+
+def law_costs(base: Scenario, *, device: str, progress: Progress) -> Table:
+    """What each law costs in place of Mohr-Coulomb, and inertial drag beside it, with everything else on."""
+    scene = base.replaced(SHORT)
+    named = {law: scene.replaced(with_law(scene, law, **own)) for law, own in OWN_FIELDS.items()}
+    named["mohr_coulomb, inertial drag"] = scene.replaced({"flow.material.inertial_drag_coefficient": 0.4})
+    clock, steppers = clock_of(device), []
+    for name, each in named.items():
+        progress(name)
+        steppers.append(Stepper(each, device=device, clock=clock))
+    yardstick = Yardstick(steppers[0].simulation.material_points, device=device, clock=clock)
+    costs = in_turns([yardstick, *steppers], rounds=ROUNDS, seconds=0.5 * TURN)
+    rows = [
+        (name, f"{cost / costs[0]:.2f}", f"{(cost - costs[1]) / costs[0]:+.2f}")
+        for name, cost in zip(named, costs[1:], strict=True)
+    ]
+    return Table("laws", "Cost of each law, two-phase, all on", ("law", "yardsticks", "against mohr_coulomb"), rows)
+
+
 def _ladder(full: Scenario) -> list[tuple[str, Scenario]]:
     """Scenes from a dry elastic flow on smooth ground up to everything, one effect more each."""
     undrained = full.replaced(without_liquid(full))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -57,85 +58,135 @@ def run_out_band(ratio: float) -> tuple[float, float]:
     return low, 1.8 * ratio if ratio < 3.0 else 2.3 * ratio ** (2 / 3)
 
 
+@dataclass(frozen=True)
+class Collapsed:
+    """A column after it has come to rest; lengths over L_0."""
+
+    run_out: float
+    height: float
+    """At the wall."""
+    mass_error: float
+    profiles: list[Curve]
+
+
+def collapsed(ratio: float, cells: int, soil: dict[str, Any], ground: float) -> Collapsed:
+    """A column of an aspect ratio, let go on a ground of some friction, with so many cells over L_0."""
+    height, spacing = ratio * HALF_WIDTH, HALF_WIDTH / cells
+    end = 6.0 * math.sqrt(height / G)
+    right = 10.0 * HALF_WIDTH * max(1.0, ratio**0.7)
+    simulation = Simulation(
+        scene(
+            f"column collapse, a = {ratio:g}",
+            box(-HALF_WIDTH, 0.0, height),
+            "dry",
+            end_time=end,
+            soil=soil,
+            ground=ground,
+            spacing_m=spacing,
+            domain={"left_edge": "wall", "left_m": -HALF_WIDTH, "right_m": right, "top_m": 1.2 * height},
+        )
+    )
+    mass = simulation.sample()["solid_mass"]
+    edges = np.arange(-HALF_WIDTH, right, 2.0 * spacing)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    curves = []
+    for share in (0.0, 0.25, 0.5, 1.0):
+        simulation.advance(share * end)
+        points = simulation.points()
+        depth = np.histogram(points["position"][:, 0], bins=edges, weights=points["volume"])[0] / (2.0 * spacing)
+        curves.append(Curve(middle / HALF_WIDTH, depth / HALF_WIDTH, f"t = {share * 6.0:g} √(H/g)"))
+    last = simulation.sample()
+    return Collapsed(
+        _edge(middle, depth) / HALF_WIDTH,
+        float(depth[0]) / HALF_WIDTH,
+        (last["solid_mass"] + last["left_mass"]) / mass - 1.0,
+        curves,
+    )
+
+
+def _of_column(ratio: float, found: Collapsed, reason: str, before: str = "") -> list[Check]:
+    low, high = run_out_band(ratio)
+    return [
+        within(f"{before}a = {ratio:g}: run-out", "L_0", found.run_out, low, high, remark=reason),
+        at_most(f"{before}a = {ratio:g}: mass lost", "of the mass", found.mass_error, 1e-6),
+        reported(
+            f"{before}a = {ratio:g}: height at the wall",
+            "L_0",
+            found.height,
+            reference=ratio if ratio < 1.15 else ratio**0.4,
+            remark="Lube et al. (2005), recalled",
+        ),
+    ]
+
+
+def _bands(curves: list[Curve]) -> Panel:
+    fine = np.linspace(0.3, 4.5, 100)
+    bands = np.array([run_out_band(float(a)) for a in fine])
+    laws = [reference(fine, bands[:, 0], "1.2 a, 1.9 a^⅔"), reference(fine, bands[:, 1], "1.8 a, 2.3 a^⅔")]
+    return Panel("run-out", "a = H/L_0", "(L − L_0)/L_0", [*laws, *curves])
+
+
 def collapse(quick: bool) -> Outcome:
     cells = 20 if quick else 40
     ratios = (1.0, 2.0) if quick else (0.5, 1.0, 2.0, 4.0)
-    spacing = HALF_WIDTH / cells
     checks: list[Check] = []
     panels: list[Panel] = []
     run_outs = []
+    reason = (
+        "no single angle of friction serves all ratios: low columns stop early and tall ones run far, because the "
+        "skeleton's friction does not grow with the rate of shearing"
+    )
     for ratio in ratios:
-        height = ratio * HALF_WIDTH
-        end = 6.0 * math.sqrt(height / G)
-        simulation = Simulation(
-            scene(
-                f"column collapse, a = {ratio:g}",
-                box(-HALF_WIDTH, 0.0, height),
-                "dry",
-                end_time=end,
-                soil=SAND,
-                ground=math.tan(math.radians(REPOSE)),
-                spacing_m=spacing,
-                domain={
-                    "left_edge": "wall",
-                    "left_m": -HALF_WIDTH,
-                    "right_m": 10.0 * HALF_WIDTH * max(1.0, ratio**0.7),
-                    "top_m": 1.2 * height,
-                },
-            )
-        )
-        mass = simulation.sample()["solid_mass"]
-        edges = np.arange(-HALF_WIDTH, 10.0 * HALF_WIDTH * max(1.0, ratio**0.7), 2.0 * spacing)
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        curves = []
-        for share in (0.0, 0.25, 0.5, 1.0):
-            simulation.advance(share * end)
-            points = simulation.points()
-            depth = np.histogram(points["position"][:, 0], bins=edges, weights=points["volume"])[0] / (2.0 * spacing)
-            curves.append(Curve(middle / HALF_WIDTH, depth / HALF_WIDTH, f"t = {share * 6.0:g} √(H/g)"))
-        last = simulation.sample()
-        front = _edge(middle, depth) / HALF_WIDTH
-        run_outs.append(front)
+        found = collapsed(ratio, cells, SAND, math.tan(math.radians(REPOSE)))
+        run_outs.append(found.run_out)
+        checks += _of_column(ratio, found, reason)
         low, high = run_out_band(ratio)
-        reason = (
-            "no single angle of friction serves all ratios: low columns stop early and tall ones run far, because the "
-            "skeleton's friction does not grow with the rate of shearing"
-        )
-        checks.append(within(f"a = {ratio:g}: run-out", "L_0", front, low, high, remark=reason))
-        checks.append(
-            at_most(
-                f"a = {ratio:g}: mass lost", "of the mass", (last["solid_mass"] + last["left_mass"]) / mass - 1.0, 1e-6
-            )
-        )
-        checks.append(
-            reported(
-                f"a = {ratio:g}: height at the wall",
-                "L_0",
-                float(depth[0]) / HALF_WIDTH,
-                reference=ratio if ratio < 1.15 else ratio**0.4,
-                remark="Lube et al. (2005), recalled",
-            )
-        )
         band = [
             Curve([low, low], [0.0, 0.15], "band of the experiments", "k--"),
             Curve([high, high], [0.0, 0.15], "", "k--"),
         ]
-        panels.append(Panel(f"a = {ratio:g}", "x / L_0", "depth / L_0", [*curves, *band], x_range=(-1.0, 1.3 * high)))
-    fine = np.linspace(0.3, 4.5, 100)
-    bands = np.array([run_out_band(float(a)) for a in fine])
-    panels.append(
-        Panel(
-            "run-out",
-            "a = H/L_0",
-            "(L − L_0)/L_0",
-            [
-                reference(fine, bands[:, 0], "1.2 a, 1.9 a^⅔"),
-                reference(fine, bands[:, 1], "1.8 a, 2.3 a^⅔"),
-                Curve(ratios, run_outs, f"L_0/{cells}", "o"),
-            ],
-        )
+        profiles = [*found.profiles, *band]
+        panels.append(Panel(f"a = {ratio:g}", "x / L_0", "depth / L_0", profiles, x_range=(-1.0, 1.3 * high)))
+    return Outcome(checks=checks, panels=[*panels, _bands([Curve(ratios, run_outs, f"L_0/{cells}", "o")])])
+
+
+RATE_SETS = {
+    "beads of 1 mm": {"static_friction": 0.48, "dynamic_friction": 0.74, "grain_diameter_m": 1e-3},
+    "fitted": {"static_friction": 0.20, "dynamic_friction": 1.0, "grain_diameter_m": 1e-2},
+}
+"""μ_s = tan 25.5°, μ_2 = tan 36.5°, I_0 = 0.279, used for collapses of beads by Ionescu et al. (2015), recalled; and a
+set that was fitted to the bands here."""
+
+
+def collapse_by_rate(quick: bool) -> Outcome:
+    cells = 20
+    ratios = (0.5, 1.0) if quick else (0.5, 1.0, 2.0, 4.0)
+    reason = (
+        "grains of a millimetre shear at an inertial number of some hundredths, at which friction has hardly grown; "
+        "walls at the sides, which slow the experiments' columns, are not in the model"
     )
-    return Outcome(checks=checks, panels=panels)
+    rest = {name: value for name, value in SAND.items() if name != "friction_angle_deg"} | {"law": "mu_i"}
+    checks: list[Check] = []
+    curves = []
+    for name, own in RATE_SETS.items():
+        run_outs = []
+        for ratio in ratios:
+            # The ground holds the grains, so that the law's own friction acts on it.
+            found = collapsed(ratio, cells, rest | own, 1.0)
+            run_outs.append(found.run_out)
+            checks += _of_column(ratio, found, reason, f"{name}, ")
+        curves.append(Curve(ratios, run_outs, name, "o"))
+    return Outcome(
+        checks=checks,
+        panels=[_bands(curves)],
+        remarks=[
+            "One set of parameters meets the bands of all four ratios, but it is not the material's: its static "
+            "friction is that of a slope of 11°, its grains are a twentieth of the column's width, and its heaps are a "
+            "third too low at the wall. With figures of real beads the low columns, which a single angle of friction "
+            "stops early, come into the band, and the tallest one still runs 13 % too far. The two laws that bound the "
+            "band were fitted to experiments that differ by half among themselves."
+        ],
+    )
 
 
 def _edge(x: Array, depth: Array) -> float:
@@ -241,6 +292,15 @@ CASES = (
         "Lagrée, Staron and Popinet (2011)",
         limit="between the two laws, a = 0.5, 1, 2, 4; mass 1e-6",
         run=collapse,
+    ),
+    Case(
+        name="collapse-by-rate",
+        title="Collapse of a dry column, μ(I)",
+        tests="The same with friction that grows with the inertial number, with figures of glass beads of 1 mm and "
+        "with one set that was fitted to the bands; the ground holds the grains.",
+        source="as above",
+        limit="between the two laws, a = 0.5, 1, 2, 4; mass 1e-6",
+        run=collapse_by_rate,
     ),
     Case(
         name="flume",

@@ -14,8 +14,9 @@ from warp_mpm.schema import Model, NonNegative
 from .law import Array, Law
 from .radial import TINY, lateral_range, make_radial, mean_and_shear, slow_stress
 
-SWEEPS = 5
-"""Newton's steps in the logarithm of the rate: from the worst start the rest is 1e-15 for exponents from 0.2 to 2."""
+SWEEPS = 2
+"""Halley's steps in the logarithm of the rate: of the viscous stress 1e-12 is left for exponents from 0.5 to 2, 4e-8 at
+0.2."""
 
 
 class Settings(Model):
@@ -100,14 +101,14 @@ class HerschelBulkley(Law):
         logarithm, exponential = tools.logarithm, tools.exponential
         radial = make_radial(types)
         parted, joined = radial.parted, radial.joined
-        zero = wp.constant(wp.float64(0.0))
+        zero, half, one = wp.constant(wp.float64(0.0)), wp.constant(wp.float64(0.5)), wp.constant(wp.float64(1.0))
 
         @wp.func
         def flow_stress(excess: wp.float64, stiffness: wp.float64, parameters: Parameters) -> wp.float64:
             """K γ̇^m of the γ̇ for which K γ̇^m + stiffness γ̇ = excess [Pa].
 
             With y = γ̇ stiffness / excess and Λ = K (excess / stiffness)^m / excess it is Λ y^m + y = 1. The logarithm
-            of the left side is convex in z = ln y, of a slope between m and 1: Newton from above never overshoots.
+            of the left side is convex in z = ln y, of a slope between m and 1 and a curvature of at most (1 - m)² / 4.
             """
             m = wp.float64(parameters.flow_exponent)
             load = logarithm(excess)
@@ -115,9 +116,12 @@ class HerschelBulkley(Law):
             z = smaller(-size / m, zero)
             viscous = exponential(size + m * z)
             for _sweep in range(wp.static(SWEEPS)):
-                plain = exponential(z)
-                both = viscous + plain
-                z -= logarithm(both) * both / (m * viscous + plain)
+                both = viscous + exponential(z)
+                share = viscous / both
+                slope = one - (one - m) * share
+                bend = half * (one - m) * (one - m) * share * (one - share)
+                gap = logarithm(both)
+                z -= gap * slope / (slope * slope - gap * bend)
                 viscous = exponential(size + m * z)
             return excess * viscous
 
