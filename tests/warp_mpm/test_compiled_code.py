@@ -27,10 +27,11 @@ Simulation(scenario).advance(1e-4)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="looked at on x86 alone")
-def test_the_update_of_the_points_is_vectorised(tmp_path):
+@pytest.mark.parametrize("name", ["case_1", "case_1_mud", "case_1_mu_i"])
+def test_the_update_of_the_points_is_vectorised(tmp_path, name):
     """The compiler says so itself; one call or one branch too many and a step costs half as much again."""
     done = subprocess.run(
-        [sys.executable, "-c", COMPILE, REPOSITORY / "scenarios/case_1.json"],
+        [sys.executable, "-c", COMPILE, REPOSITORY / f"scenarios/{name}.json"],
         env=os.environ | {"WARP_CACHE_PATH": str(tmp_path), "PYTHONPATH": str(REPOSITORY)},
         capture_output=True,
         text=True,
@@ -54,7 +55,14 @@ def test_the_update_of_the_points_is_vectorised(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="Warp comes without CUDA there")
 @pytest.mark.parametrize(
-    ("name", "precision"), [("case_1", "float64"), ("case_1", "float32"), ("case_1_dry", "float64")]
+    ("name", "precision"),
+    [
+        ("case_1", "float64"),
+        ("case_1", "float32"),
+        ("case_1_dry", "float64"),
+        ("case_1_mud", "float64"),
+        ("case_1_mu_i", "float64"),
+    ],
 )
 def test_the_same_kernels_compile_for_a_gpu(load_scene, tmp_path, name, precision):
     """By NVIDIA's own compiler, which needs no GPU; whether they run there is another question."""
