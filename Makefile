@@ -24,14 +24,15 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice.
+# A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice. The
+# longest first, as tests/conftest.py has them, which by itself would be the files of the most tests.
 test: lint
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 # Functions that Warp compiles are left out: Python does not run them.
 coverage: $(VENV)/.test
 	mkdir -p build && rm -f build/coverage*
-	$(BIN)/python -m coverage run -m pytest -n $(JOBS) --dist loadfile
+	$(BIN)/python -m coverage run -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 	$(BIN)/python -m coverage combine --quiet
 	$(BIN)/python -m coverage report --skip-covered --sort=cover
 

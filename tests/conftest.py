@@ -6,6 +6,28 @@ from warp_mpm import run
 
 DRAW = run._draw
 
+LONGEST = (
+    "test_known_answers.py",
+    "test_bodies.py",
+    "test_debris_flow.py",
+    "test_effects.py",
+    "test_rooms.py",
+    "test_safeguards.py",
+    "test_collection.py",
+    "test_cross_check.py",
+    "test_transfer.py",
+    "test_resume.py",
+    "test_batch.py",
+    "test_compiled_code.py",
+)
+"""Files that take longest, in the order in which they begin, so that no process is left alone with one at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    """The longest files first, the others as they are found."""
+    order = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path.name, len(LONGEST)))
+
 
 @pytest.fixture(autouse=True, scope="module")
 def runs_without_pictures():

@@ -161,7 +161,7 @@ def test_walls_stay_in_place_while_the_grid_rides(load_scene):
         "numerics.spacing_m": 0.5,
         "domain.left_edge": "wall", "domain.right_edge": "wall", "domain.left_m": -25.0, "domain.right_m": 20.0,
     }  # fmt: skip
-    simulation = Simulation(load_scene("case_1", **changes))
+    simulation = Simulation(load_scene("case_1_dry", **changes))
     simulation.advance(0.4)
     step = float(simulation._clock.numpy()[2])
     shift = simulation.barrier_displacement - 2.0 * step
@@ -217,7 +217,8 @@ def block(left, right, height):
     return Outline([[left, -1.0], [right, -1.0], [right, height], [left, height]])
 
 
-@pytest.mark.parametrize("formulation", ["dry", "undrained", "two_phase"])
+# Undrained there is one velocity, as in a dry flow, and a liquid's pressure, as in a two-phase one.
+@pytest.mark.parametrize("formulation", ["dry", pytest.param("undrained", marks=pytest.mark.slow), "two_phase"])
 def test_two_sliding_blocks_and_a_pillar(formulation):
     """A pool breaks out on both sides and shoves two blocks of different weight away; a pillar in its middle stands.
 

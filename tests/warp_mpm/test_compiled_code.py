@@ -17,29 +17,45 @@ REPOSITORY = Path(__file__).parents[2]
 
 COMPILE = """
 import sys
-from warp_mpm import Scenario, Simulation
+from unittest.mock import patch
+
+import warp as wp
+from warp_mpm import Scenario
+from warp_mpm.effect_rules import derive_effects
 from warp_mpm.kernels import build
 
 build.CPU_COMPILER_FLAGS += " -Rpass=loop-vectorize"
-scenario = Scenario.load(sys.argv[1]).replaced({"numerics.spacing_m": 0.5})
-Simulation(scenario).advance(1e-4)
+effects = derive_effects(Scenario.load(sys.argv[1]))
+build.build_kernels(effects)
+module = wp.get_module(effects.module_name)
+module.options["block_dim"] = 1  # as on a processor
+with patch("warp._src.build.build_cpu"):  # the source of all of it, which nobody compiles
+    wp.compile_aot_module(module, device="cpu", module_dir=f"{sys.argv[2]}/all")
+of_update = [kernel for kernel in module._get_live_kernels() if kernel.key.endswith("__update")]
+with patch.object(module, "_get_live_kernels", lambda: of_update):
+    module.mark_modified()
+    wp.compile_aot_module(module, device="cpu", module_dir=f"{sys.argv[2]}/update")
 """
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="looked at on x86 alone")
 @pytest.mark.parametrize("name", ["case_1", "case_1_mud", "case_1_mu_i"])
 def test_the_update_of_the_points_is_vectorised(tmp_path, name):
-    """The compiler says so itself; one call or one branch too many and a step costs half as much again."""
+    """The compiler says so itself; one call or one branch too many and a step costs half as much again. It is given
+    this kernel alone, as all of them take it four times as long."""
     done = subprocess.run(
-        [sys.executable, "-c", COMPILE, REPOSITORY / f"scenarios/{name}.json"],
-        env=os.environ | {"WARP_CACHE_PATH": str(tmp_path), "PYTHONPATH": str(REPOSITORY)},
+        [sys.executable, "-c", COMPILE, REPOSITORY / f"scenarios/{name}.json", tmp_path],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    (source,) = tmp_path.rglob("*.cpp")
+    assert done.returncode == 0, done.stderr
+    (source,) = (tmp_path / "all").glob("*.cpp")
     # It alone has Warp's two versions, with and without gaps in the arrays: each of another kernel is for nothing.
-    assert set(re.findall(r"__locals__(\w+)_[0-9a-f]{8}_cpu_forward_tasks<true>", source.read_text())) == {"update"}
+    versions = r"__locals__(\w+)_[0-9a-f]{8}_cpu_forward_tasks<true>"
+    assert set(re.findall(versions, source.read_text())) == {"update"}
+    (source,) = (tmp_path / "update").glob("*.cpp")
     lines = source.read_text().splitlines()
     vectorised = set()
     for line, width in re.findall(
@@ -58,10 +74,9 @@ def test_the_update_of_the_points_is_vectorised(tmp_path, name):
     ("name", "precision"),
     [
         ("case_1", "float64"),
-        ("case_1", "float32"),
-        ("case_1_dry", "float64"),
-        ("case_1_mud", "float64"),
-        ("case_1_mu_i", "float64"),
+        ("case_1_dry", "float32"),
+        pytest.param("case_1_mud", "float64", marks=pytest.mark.slow),  # a quarter of a minute each
+        pytest.param("case_1_mu_i", "float64", marks=pytest.mark.slow),
     ],
 )
 def test_the_same_kernels_compile_for_a_gpu(load_scene, tmp_path, name, precision):

@@ -80,9 +80,9 @@ SCENES = {
     "case_1": {},
     "case_1_dry": {},
     "case_1_undrained": {},
-    "case_1_fixed": {"numerics.precision": "float32"},
+    "case_1_fixed": {},
     "case_5": {},
-    "set_iib": {},
+    "set_iib": {"numerics.precision": "float32"},
     "set_v": {},
 }  # fmt: skip
 
