@@ -11,9 +11,12 @@ Nothing is loaded, and no device started, before a name is used.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+
+TYPE_CHECKING = False  # without `typing`, which takes long enough for a Ctrl-C before the command line can hear it
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from warp_mpm.results import Results as Results
     from warp_mpm.scenario import Scenario as Scenario
     from warp_mpm.scenario_errors import ScenarioError as ScenarioError

@@ -276,11 +276,12 @@ def test_schema_is_json(command):
 
 
 def test_import_starts_nothing():
-    """Of other packages the import brings none at all, and so costs no time."""
+    """Of other packages the import brings none at all, of the library next to none, and so costs no time: a Ctrl-C
+    meets the command line, which knows what to do with it."""
     code = "import sys; before = set(sys.modules); import warp_mpm; print(*(set(sys.modules) - before))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     roots = {name.partition(".")[0] for name in answer}
-    assert roots - sys.stdlib_module_names == {"warp_mpm"}
+    assert roots - {"__future__"} == {"warp_mpm"}
 
 
 def test_public_names():

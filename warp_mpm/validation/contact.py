@@ -95,7 +95,7 @@ def _bystander(mass: float, friction: float, end_time: float) -> Simulation:
             "dry",
             end_time=end_time,
             lateral=1.0,
-            soil={"law": "elastic"},
+            soil={"cohesion_Pa": 1e6},  # it stays what it is, by the kernels of the collisions
             barrier={
                 "shape": {"kind": "trapezoid", "base_width_m": 11.0, "crest_width_m": 4.0, "height_m": 6.0},
                 "motion": {"kind": "sliding", "mass_kg_per_m": mass, "base_friction": friction},
