@@ -106,9 +106,9 @@ SPACING = "it must be a finite number at least 1e-06 and at most 1e+06."
         ),
         (
             "warp_mpm plot foo run",
-            "kind = foo is not allowed; it must be one of scene, history, comparison, field, mechanism.",
+            "kind = foo is not allowed; it must be one of scene, history, comparison, field, mechanism, loads.",
         ),
-        ("warp_mpm plot", "kind is missing; it must be one of scene, history, comparison, field, mechanism."),
+        ("warp_mpm plot", "kind is missing; it must be one of scene, history, comparison, field, mechanism, loads."),
         ("warp_mpm plot history", "RUN_DIR is missing; it must be given."),
         ("warp_mpm benchmark foo", "what = foo is not allowed; it must be one of speed, effects, gpu."),
         ("warp_mpm run --foo", "No such option: --foo (Possible options: --force, --out); see root run --help."),
