@@ -101,8 +101,8 @@ CRITERIA = (
     ),
     Criterion(
         "halving_peak_force",
-        0.05,
-        0.05,
+        0.02,
+        0.02,
         "change of the filtered peak force when the time step is halved, over that force or a tenth of rho v² h",
     ),
     Criterion(
@@ -133,8 +133,8 @@ CRITERIA = (
     ),
     Criterion(
         "halving_displacement",
-        0.05,
-        0.05,
+        0.02,
+        0.02,
         "change of the barrier's final displacement when the time step is halved, over that or a cell",
     ),
 )

@@ -90,7 +90,8 @@ KNOWN_LIMITS = (
     "(`falling_jet`, 0.28), in the tip of a wedge that closes (`closing_wedge`, 0.28), and before a barrier that is "
     "shaken at 10 Hz (`driven_shaken`, 0.43).",
     "Mud that hardly yields (`mud_yield_1e6`, `mud_viscosity_1e6`) hits the barrier as an elastic block does: its "
-    "pressure varies within a cell at toe and crest, by up to 0.29 of the signal.",
+    "pressure varies within a cell at toe and crest, by up to 0.29 of the signal; its force moves by 2.4 "
+    "and 3.2 % when the step is halved.",
     "FLIP keeps velocities of points that the grid does not see, and no affine field: where the flow is faster than "
     "sound (`flip_soft`), what single points do depends on the step.",
     "Where a jet lands, single points meet the ground at up to 0.6 of the bound that their water hammer sets, for a "
@@ -117,8 +118,8 @@ KNOWN_FAILURES = {
     "falling_jet": frozenset({"pressure_noise"}),
     "flip_soft": frozenset({"halving_peak_force", "pushed_share"}),
     "friction_angle_45": frozenset({"halving_displacement"}),
-    "mud_viscosity_1e6": frozenset({"pressure_noise"}),
-    "mud_yield_1e6": frozenset({"pressure_noise"}),
+    "mud_viscosity_1e6": frozenset({"pressure_noise", "halving_peak_force"}),
+    "mud_yield_1e6": frozenset({"pressure_noise", "halving_peak_force"}),
     "odd_spacing": frozenset({"halving_displacement"}),
     "one_point": frozenset({"halving_peak_force"}),
 }
