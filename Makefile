@@ -43,7 +43,7 @@ validate: $(VENV)/.test
 accuracy: $(VENV)/.run
 	$(BIN)/python -m warp_mpm accuracy scenarios/set_*.json scenarios/case_1.json --quick \
 		--data warp_mpm/accuracy/paper_scenes.json --page docs/accuracy.md
-	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --page docs/accuracy.md
+	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --quick --page docs/accuracy.md
 	$(BIN)/python -m warp_mpm accuracy scenarios/set_iib.json --quick --page docs/accuracy.md
 	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --check --until 4 --page docs/accuracy.md
 
