@@ -29,7 +29,7 @@ SCENES, SEED = 10, 20261130
 ASKED = (0.05, 0.10, 0.20, 0.50)
 """Accuracies asked for in turn, until one is granted, in every other scene."""
 
-BUDGET = 10.0
+BUDGET = 20.0
 """Time asked for in the others [s]: a spacing finer than the probes'."""
 
 RANGES = (
