@@ -90,6 +90,9 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Go on with the interrupted run in this folder.", show_default=False),
     ] = None,
+    pictures: Annotated[
+        bool, typer.Option(help="Draw two figures at the end; they take longer than a coarse run.")
+    ] = True,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Scenarios at a time.", show_default="number of cores")
     ] = None,
@@ -114,7 +117,7 @@ def run(
             _refuse("--resume DIR goes on with one run; it takes no scenario files.")
         from warp_mpm.commands.several import run_several
 
-        options = _options(device, spacing, until, report, force)
+        options = _options(device, spacing, until, report, force, pictures)
         run_several(scenario_files, out, jobs, options, quiet, as_json, until=until, force=force)
         return
     scenario_file, ended_before = scenario_files[0] if scenario_files else None, False
@@ -163,7 +166,13 @@ def run(
         with signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display:
             stopped = lambda: signal.received  # noqa: E731
             if resume is not None:
-                outcome = resume_run(folder, make_simulation=make_simulation, on_progress=display.show, stop=stopped)
+                outcome = resume_run(
+                    folder,
+                    make_simulation=make_simulation,
+                    on_progress=display.show,
+                    stop=stopped,
+                    pictures=pictures,
+                )
             else:
                 outcome = run_scenario(
                     scenario,
@@ -173,6 +182,7 @@ def run(
                     origin=str(scenario_file),
                     on_progress=display.show,
                     stop=stopped,
+                    pictures=pictures,
                 )
     except (RunFolderError, ResultsError) as error:
         _refuse(str(error))
@@ -236,12 +246,14 @@ def schema() -> None:
 register(app)
 
 
-def _options(device: str, spacing: float | None, until: float | None, report: bool, force: bool) -> list[str]:
+def _options(
+    device: str, spacing: float | None, until: float | None, report: bool, force: bool, pictures: bool
+) -> list[str]:
     """The options of `run`, as they are typed."""
     options = ["--device", device]
     for name, value in (("--spacing", spacing), ("--until", until)):
         options += [name, repr(value)] if value is not None else []
-    return options + ["--report"] * report + ["--force"] * force
+    return options + ["--report"] * report + ["--force"] * force + ["--no-pictures"] * (not pictures)
 
 
 def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenario:

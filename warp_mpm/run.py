@@ -141,6 +141,7 @@ def run_scenario(
     recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    pictures: bool = True,
 ) -> RunOutcome:
     """Simulate a scenario and record it in a run folder.
 
@@ -156,6 +157,7 @@ def run_scenario(
             the end of the run, however it ends.
         on_progress: called after each record.
         stop: asked between records; true ends the run cleanly before its time.
+        pictures: draw the run's two figures at the end, which takes longer than a coarse run does.
 
     Raises:
         RunFolderError: `out` cannot be used; nothing was touched.
@@ -168,7 +170,7 @@ def run_scenario(
     simulation.prepare()
     record = _record(scenario, simulation, origin) | {"preparation_time": time.perf_counter() - preparing}
     with RunFolder.create(out, scenario.resolved(), record, force=force) as folder:
-        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, pictures)
 
 
 def resume_run(
@@ -178,6 +180,7 @@ def resume_run(
     recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    pictures: bool = True,
 ) -> RunOutcome:
     """Go on with an interrupted run from its last checkpoint; on the CPU its records are then, bit for bit, those of a
     run that was not interrupted. A run that was interrupted before its first record begins anew.
@@ -188,6 +191,7 @@ def resume_run(
         recorders: as in `run_scenario`; they record where the run goes on, and from then on at their times.
         on_progress: as in `run_scenario`.
         stop: as in `run_scenario`.
+        pictures: as in `run_scenario`.
 
     Raises:
         RunFolderError: there is nothing to go on with, or it is damaged; the sentence says so, nothing was touched.
@@ -199,7 +203,7 @@ def resume_run(
         folder.lock()
         record = results.record
         if record.get("status") == "finished":
-            outcome = RunOutcome(out, True, evaluate(out))
+            outcome = RunOutcome(out, True, evaluate(out, pictures=pictures))
             (out / run_folder.CHECKPOINT).unlink(missing_ok=True)
             return outcome
         if not (out / run_folder.SCENARIO).exists():
@@ -228,7 +232,7 @@ def resume_run(
             "preparation_time": preparation_time,
         }
         record |= {"status": "running", "problem": None, "resumed": [*record.get("resumed", []), resumed]}
-        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, checkpoint)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, pictures, checkpoint)
 
 
 def _go_on(
@@ -239,6 +243,7 @@ def _go_on(
     own: Sequence[Recorder],
     on_progress: Callable[[RunProgress], None] | None,
     stop: Callable[[], bool],
+    pictures: bool,
     checkpoint: Checkpoint | None = None,
 ) -> RunOutcome:
     """Run to the end and record, from the start or from a checkpoint to which the simulation has been set back."""
@@ -302,7 +307,7 @@ def _go_on(
         }
         with contextlib.suppress(OSError):
             folder.write(run_folder.RECORD, record | ended)
-    outcome = RunOutcome(out, finished, evaluate(out))
+    outcome = RunOutcome(out, finished, evaluate(out, pictures=pictures))
     if finished:
         (out / run_folder.CHECKPOINT).unlink(missing_ok=True)
     return outcome
@@ -342,8 +347,8 @@ def _asked(scenario: Scenario) -> list[str] | None:
     return None if scenario.output.quantities is None else recorded_quantities(scenario)
 
 
-def evaluate(path: str | Path) -> dict[str, Any]:
-    """Write the summary and the figures of a run folder from its records, and return the summary.
+def evaluate(path: str | Path, *, pictures: bool = True) -> dict[str, Any]:
+    """Write the summary and, where asked for, the figures of a run folder from its records, and return the summary.
 
     Raises:
         ResultsError: the records cannot be read, or a figure is no finite number.
@@ -356,7 +361,8 @@ def evaluate(path: str | Path) -> dict[str, Any]:
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
-        _draw(results, path)
+        if pictures:
+            _draw(results, path)
     return summary
 
 

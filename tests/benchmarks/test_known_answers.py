@@ -41,6 +41,13 @@ WORST = {
 }
 """How far a check that falls short may be off today, by words of its quantity; the first that fits counts."""
 
+ALONE = (
+    *("bagnold", "collapse-by-rate", "flume", "heap", "inertial-settling"),
+    *("pressure-on-a-slope", "saturated-wave", "spreading"),
+)
+"""Cases whose kernels hardly another test needs: compiling them takes longer than the case. Their quick variants are
+run with `slow`; `film`, `laws`, `collapse` and `free-settling` stand for their kind."""
+
 
 def unexpected(case, quick):
     outcome = case.run(quick)
@@ -59,7 +66,10 @@ def tolerated(check):
     return check.error is None or check.error <= (bounds[0] if bounds else math.inf)
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case.in_quick], ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, id=c.name, marks=[pytest.mark.slow] * (c.name in ALONE)) for c in CASES if c.in_quick],
+)
 def test_quick(case):
     assert unexpected(case, quick=True) == []
 

@@ -1,5 +1,6 @@
 """The page and the command of the validation, on made-up cases; and that a check can fail."""
 
+import dataclasses
 import re
 
 import numpy as np
@@ -93,6 +94,17 @@ def test_all_within_their_limits_is_exit_code_0(tmp_path, only_made_up):
     result = runner.invoke(app, ["validate", "--only", "made-up", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert "| **short** |" not in (tmp_path / "validation.md").read_text(encoding="utf-8")
+
+
+def test_what_ended_before_an_interrupt_is_on_the_page(tmp_path, monkeypatch):
+    def heard(quick):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(catalogue, "CASES", (made_up(), dataclasses.replace(made_up("second"), run=heard)))
+    result = runner.invoke(app, ["validate", "--out", str(tmp_path)])
+    assert result.exit_code == 130
+    assert "Interrupted in second; 1 of 2 cases are on the page" in result.stderr
+    assert "a length" in (tmp_path / "validation.md").read_text(encoding="utf-8")
 
 
 def test_an_unknown_case_is_one_sentence(tmp_path):

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from warp_mpm.cli import app
 from warp_mpm.commands import EXAMPLES, hard_cases
+from warp_mpm.hard_cases.measure import Measured
 
 
 def command(*arguments):
@@ -33,6 +34,34 @@ def test_an_unstable_case_is_told(tmp_path, monkeypatch):
     result = command("--quick", "--only", "one_point", "--out", tmp_path)
     assert result.exit_code == 1
     assert "NOT STABLE: diverged 0, mass_error" in result.stdout
+
+
+def test_what_was_measured_before_an_interrupt_is_kept_and_taken_over(tmp_path, monkeypatch):
+    run = []
+
+    def measured(scenario, *, halve):
+        run.append(scenario.title)
+        if len(run) == 2:
+            raise KeyboardInterrupt
+        return Measured({"wall_time": 0.1 * len(run), "speed_ratio": 0.5})
+
+    monkeypatch.setattr("warp_mpm.hard_cases.measure.measure", measured)
+    words = ("--quick", "--only", "one_point", "--only", "face_90", "--out", tmp_path)
+    stopped = command(*words)
+    assert stopped.exit_code == 130
+    assert "1 of 2 cases are in" in stopped.stderr
+    (kept,) = json.loads((tmp_path / "hard_cases.json").read_text())
+    assert command(*words, "--resume").exit_code == 0
+    assert len(run) == 3  # the one that was kept is not run again
+    assert json.loads((tmp_path / "hard_cases.json").read_text())[kept]["figures"]["wall_time"] == 0.1
+    assert command(*words).exit_code == 0  # without --resume everything is
+    assert len(run) == 5
+    # What another program measured, or this one without the runs at half the time step, is not taken over.
+    monkeypatch.setattr("warp_mpm.hard_cases.record.run_key", lambda scenario: "other")
+    assert command(*words, "--resume").exit_code == 0
+    assert len(run) == 7
+    (tmp_path / "hard_cases.json").write_text("{")
+    assert "cannot be read" in command(*words, "--resume").stderr
 
 
 @pytest.mark.parametrize(

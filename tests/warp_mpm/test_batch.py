@@ -10,7 +10,7 @@ from warp_mpm.batch import Job, run_jobs
 from warp_mpm.cli import app
 
 SCENES = Path(__file__).parents[2] / "scenarios"
-COARSE = ("--spacing", "1", "--until", "0.3")
+COARSE = ("--spacing", "1", "--until", "0.3", "--no-pictures")
 
 
 def status(folder):
@@ -36,7 +36,13 @@ def test_scenes_run_each_into_its_folder(tmp_path, monkeypatch):
 def test_stop_ends_what_runs_and_begins_no_more(tmp_path, monkeypatch):
     monkeypatch.chdir(SCENES.parent)
     jobs = []
-    endless = ("--spacing", "0.5", "--until", "3600")  # whatever the machine, not over before the stop gets there
+    endless = (
+        "--spacing",
+        "0.25",
+        "--until",
+        "200",
+        "--no-pictures",
+    )  # whatever the machine, not over before the stop gets there
     for name in ("case_1", "case_4", "case_6"):
         folder = tmp_path / name
         jobs.append(Job(name, folder, (str(SCENES / f"{name}.json"), "--out", str(folder), *endless), 3600.0))

@@ -256,7 +256,7 @@ def test_a_run_among_several_whose_parent_was_killed_is_kept(tmp_path):
         "    if time > 0.0: os.kill(os.getpid(), signal.SIGKILL)\n"
         "if __name__ == '__main__':\n"
         "    folder = sys.argv[1]\n"
-        "    options = ('--spacing', '1', '--until', '300', '--out', folder)\n"
+        "    options = ('--spacing', '1', '--until', '300', '--no-pictures', '--out', folder)\n"
         "    run_jobs([Job('run', Path(folder), ('scenarios/case_1.json', *options), 300.0)], at_once=1,\n"
         "             on_progress=look)\n"
     )

@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 
 def start(*arguments, **options):
     return subprocess.Popen(
-        [sys.executable, "-m", "warp_mpm", "run", *map(str, arguments)],
+        [sys.executable, "-m", "warp_mpm", "run", "--no-pictures", *map(str, arguments)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -15,6 +15,7 @@ from warp_mpm import Scenario, ScenarioError, Simulation, laws, schemes
 from warp_mpm.caveats import scene_caveats
 from warp_mpm.effect_rules import derive_effects, effect_rules, with_law
 from warp_mpm.effects import Effects
+from warp_mpm.kernels.build import build_kernels
 from warp_mpm.laws import Law, Model, PointField
 from warp_mpm.scenario import Numerics, json_schema
 from warp_mpm.scenario.scene import offer_anew
@@ -37,7 +38,7 @@ def only_here():
     for room, by_name, keys in kept:
         room._by_name, room._keys = by_name, keys
     for name in set(Numerics.model_fields) - fields:
-        del Numerics.model_fields[name]
+        del Numerics.model_fields[name], Numerics.__annotations__[name]
     offer_anew()
 
 
@@ -271,18 +272,16 @@ def make_law(factor):
 
 def test_two_laws_of_one_name_are_two_modules(load_scene):
     base = load_scene("case_1_dry", **GROUND_ALONE)
-    results, modules = [], []
+    effects = []
     for factor in (1.0, 0.0, 1.0):
         laws.register(make_law(factor))
-        scenario = base.replaced(with_law(base, "again"))
-        simulation = Simulation(scenario)
-        simulation.advance(until=0.1)
-        results.append(simulation.points()["effective_stress"])
-        modules.append(derive_effects(scenario).module_name)
+        effects.append(derive_effects(base.replaced(with_law(base, "again"))))
+    modules = [each.module_name for each in effects]
     assert modules[0] == modules[2] != modules[1]
-    assert (results[1] == 0.0).all()
-    np.testing.assert_array_equal(results[0], results[2])
-    assert np.abs(results[0]).max() > 1e3
+    # The first law is still found by those effects that were made of it, though the name was another's meanwhile.
+    first, other = effects[0].skeleton, effects[1].skeleton
+    assert content(first) == content(effects[2].skeleton) != content(other)
+    assert build_kernels(effects[0]) is build_kernels(effects[2]) is not build_kernels(effects[1])
 
 
 def test_content_follows_what_a_law_calls_and_not_its_comments():
@@ -386,7 +385,7 @@ def test_a_scheme_may_bring_kernels_of_its_own(load_scene):
     assert (simulation.points(["count"])["count"] == simulation.steps).all()
 
 
-@pytest.mark.parametrize("name", ["case_1", "case_1_dry", "hard/flip"])
+@pytest.mark.parametrize("name", ["case_1", "case_1_dry", pytest.param("hard/flip", marks=pytest.mark.slow)])
 def test_the_order_of_launches_is_what_is_launched(load_scene, name):
     scenario = load_scene(name, **COARSE)
     simulation = Simulation(scenario)

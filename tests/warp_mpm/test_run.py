@@ -208,3 +208,10 @@ def test_commands_refuse_a_run_of_another_version(tmp_path, coarse_case_1, flyin
 def test_no_run_folder(tmp_path):
     with pytest.raises(ResultsError, match="is no folder"):
         Results.open(tmp_path / "none")
+
+
+def test_pictures_are_drawn_where_asked_for(coarse_case_1, tmp_path, flying_points):
+    """They take longer than a coarse run; `plot` and `report` draw them at any time."""
+    run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points, pictures=False)
+    pictures = {run_folder.FORCE_PLOT, run_folder.PRESSURE_PLOT}
+    assert {item.name for item in (tmp_path / "run").iterdir()} == {*run_folder.OWN_FILES} - pictures

@@ -26,13 +26,10 @@ from warp_mpm.state import arrays
 ROOT = Path(__file__).parents[2]
 
 
-WITHOUT_PICTURES = "-c 'from warp_mpm import cli, run; run._draw = lambda *given: None; cli.main()'"
-
-
 def run(folder, redirection="", pictures=False, **environment):
     """A short run in a shell; with its pictures it takes twice as long."""
-    command = "-m warp_mpm" if pictures else WITHOUT_PICTURES
-    words = f"'{sys.executable}' {command} run scenarios/case_1.json --spacing 1 --until 0.3 --out '{folder}'"
+    options = "--spacing 1 --until 0.3" + " --no-pictures" * (not pictures)
+    words = f"'{sys.executable}' -m warp_mpm run scenarios/case_1.json {options} --out '{folder}'"
     return subprocess.run(
         f"{words} {redirection}",
         shell=True,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from analytic.command_line import complain, refusals
+
 UNSTABLE = 1
+
+FIGURES = "hard_cases.json"
 
 
 def hard_cases(
@@ -25,20 +28,24 @@ def hard_cases(
     page: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the page of the record, its pictures beside it.")
     ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Take over what this program has run before into the same folder.")
+    ] = False,
 ) -> None:
     """Run the scenes that were chosen to break the code, and tell for each whether it is stable.
 
     A scene is a file of scenarios/hard/. What is demanded of it, and why, is in warp_mpm/hard_cases/criteria.py. The
-    folder then holds a picture of each case and hard_cases.json with all figures.
+    folder then holds a picture of each case and hard_cases.json with all figures, which is written after each case.
 
-    Exit codes: 0 all are stable, 1 some are not, 2 the input cannot be used.
+    Exit codes: 0 all are stable, 1 some are not, 2 the input cannot be used, 130 interrupted; --resume then goes on.
     """
     from rich.console import Console
     from rich.table import Table
 
+    from analytic.whole_file import write_whole
     from warp_mpm.hard_cases import collection
     from warp_mpm.hard_cases.measure import measure
-    from warp_mpm.hard_cases.record import COLUMNS, picture, record_page, row
+    from warp_mpm.hard_cases.record import COLUMNS, Kept, picture, record_page, row
     from warp_mpm.scenario_errors import ScenarioError
 
     pictures = out if page is None else page.with_suffix("")
@@ -56,16 +63,29 @@ def hard_cases(
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 140
+    with refusals():
+        kept = Kept(out / FIGURES, halved=not quick, goes_on=resume)
     outcomes = []
-    for case in cases:
-        measured = measure(case.scenario, halve=not quick)
-        picture(case, measured, pictures / f"{case.name}.png")
-        outcomes.append((case, measured))
-        failed = measured.failures(case.scenario)
-        state = "stable" if not failed else "NOT STABLE: " + ", ".join(f"{c.figure} {v:.3g}" for c, v in failed)
-        console.print(f"{case.name:<20} {measured.figures['wall_time']:6.1f} s  {state}", soft_wrap=True)
-        if measured.problem:
-            console.print(f"  {measured.problem}", soft_wrap=True)
+    try:
+        for case in cases:
+            measured = kept.found(case)
+            if measured is None or not (pictures / f"{case.name}.png").exists():
+                measured = measure(case.scenario, halve=not quick)
+                with refusals():
+                    picture(case, measured, pictures / f"{case.name}.png")
+                    kept.keep(case, measured)
+            outcomes.append((case, measured))
+            failed = measured.failures(case.scenario)
+            state = "stable" if not failed else "NOT STABLE: " + ", ".join(f"{c.figure} {v:.3g}" for c, v in failed)
+            console.print(f"{case.name:<20} {measured.figures['wall_time']:6.1f} s  {state}", soft_wrap=True)
+            if measured.problem:
+                console.print(f"  {measured.problem}", soft_wrap=True)
+    except KeyboardInterrupt:
+        complain(
+            f"Interrupted; {len(outcomes)} of {len(cases)} cases are in {out / FIGURES}. The same command with "
+            "--resume goes on from there."
+        )
+        raise typer.Exit(130) from None
 
     table = Table(box=None, padding=(0, 1, 0, 0))
     for heading in ("case", *(heading for _, heading in COLUMNS), "verdict"):
@@ -73,17 +93,9 @@ def hard_cases(
     for case, measured in outcomes:
         table.add_row(*row(case, measured))
     console.print(table)
-    figures = {
-        case.name: {
-            "stable": not measured.failures(case.scenario),
-            "problem": measured.problem,
-            "figures": measured.figures,
-        }
-        for case, measured in outcomes
-    }
-    (out / "hard_cases.json").write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     if page is not None:
-        page.write_text(record_page(outcomes, pictures.name), encoding="utf-8")
+        with refusals():
+            write_whole(page, record_page(outcomes, pictures.name))
     stable = sum(not measured.failures(case.scenario) for case, measured in outcomes)
     console.print(f"{stable} of {len(cases)} cases are stable; pictures and figures are in {out}", soft_wrap=True)
     if stable < len(cases):

@@ -27,11 +27,12 @@ def validate(
     The folder then holds validation.md and, in validation/, a plot of each case. Every case has a limit; a number that
     misses it stays on the page as short, with the reason.
 
-    Exit codes: 0 all within their limits, 1 some fall short, 2 the input cannot be used.
+    Exit codes: 0 all within their limits, 1 some fall short, 2 the input cannot be used, 130 interrupted; the page then
+    holds the cases that ended.
     """
     from rich.console import Console
 
-    from analytic.command_line import refusals
+    from analytic.command_line import complain, refusals
     from warp_mpm.validation import catalogue, page
 
     with refusals():
@@ -42,10 +43,14 @@ def validate(
         console.width = 160
     results = []
     for case in cases:
-        with console.status(f"{case.name} ..."):
-            begin = time.perf_counter()
-            outcome = case.run(quick)
-            results.append(page.Result(case, outcome, time.perf_counter() - begin))
+        try:
+            with console.status(f"{case.name} ..."):
+                begin = time.perf_counter()
+                outcome = case.run(quick)
+        except KeyboardInterrupt:
+            complain(f"Interrupted in {case.name}; {len(results)} of {len(cases)} cases are on the page in {out}.")
+            raise typer.Exit(130) from None
+        results.append(page.Result(case, outcome, time.perf_counter() - begin))
         console.print(f"{case.title}  ({results[-1].seconds:.1f} s)", style="bold")
         console.print(page.check_table(outcome))
         with refusals():

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from analytic.whole_file import write_whole
+from warp_mpm.accuracy.keys import code_digest, run_key
 from warp_mpm.fields import field_named
 from warp_mpm.hard_cases.collection import HardCase
 from warp_mpm.hard_cases.criteria import CRITERIA
@@ -19,6 +23,50 @@ from warp_mpm.results import Snapshot
 Outcome = tuple[HardCase, Measured]
 
 
+class Kept:
+    """Figures of the cases that have been run, in a file that is written whole after each.
+
+    Args:
+        path: of the file; an earlier run's cases stay in it until they are run again.
+        halved: whether this run makes the runs at half the time step.
+        goes_on: find what the same program has measured before.
+    """
+
+    def __init__(self, path: Path, *, halved: bool, goes_on: bool) -> None:
+        self._path, self._halved, self._goes_on = path, halved, goes_on
+        self._cases: dict[str, dict[str, Any]] = {}
+        if goes_on and path.exists():
+            try:
+                self._cases = dict(json.loads(path.read_text(encoding="utf-8")))
+            except ValueError as error:
+                raise ValueError(f"{path} cannot be read: {error}; without --resume it is replaced") from None
+
+    def found(self, case: HardCase) -> Measured | None:
+        """What was measured of a case before, without its snapshots; None where it must be run."""
+        one = self._cases.get(case.name)
+        if not self._goes_on or not isinstance(one, dict) or one.get("key") != self._key(case):
+            return None
+        return Measured(dict(one["figures"]), one["problem"])
+
+    def keep(self, case: HardCase, measured: Measured) -> None:
+        """Add a case to the file.
+
+        Raises:
+            UnwrittenError: the file cannot be written.
+        """
+        self._cases[case.name] = {
+            "stable": not measured.failures(case.scenario),
+            "problem": measured.problem,
+            "figures": measured.figures,
+            "key": self._key(case),
+        }
+        write_whole(self._path, json.dumps(self._cases, indent=2) + "\n")
+
+    def _key(self, case: HardCase) -> str:
+        own = code_digest(["warp_mpm.hard_cases.measure"])
+        return f"{run_key(case.scenario)}-{own}" + "-halved" * self._halved
+
+
 def picture(case: HardCase, measured: Measured, path: Path) -> None:
     """Draw the case at its most violent snapshot and at its end, coloured by pore pressure (speed, if dry)."""
     frames = [frame for frame in (measured.peak, measured.last) if frame is not None and len(frame.position) > 0]
@@ -28,7 +76,7 @@ def picture(case: HardCase, measured: Measured, path: Path) -> None:
     figure = Figure(figsize=(9.5, height + 0.6), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, max(len(frames), 1), width_ratios=shapes or [1.0])
-    for panel, frame, sight in zip(np.ravel(panels), frames, windows, strict=True):
+    for panel, frame, sight in zip(np.ravel(panels)[: len(frames)], frames, windows, strict=True):
         wet = "pore_pressure" in frame
         field = field_named("pore_pressure" if wet else "speed")
         values = frame["pore_pressure"] / 1e3 if wet else np.hypot(*frame["solid_velocity"].T)

@@ -116,7 +116,11 @@ def run_case(
 
     try:
         outcome = run_scenario(
-            Scenario.model_validate(scenario), path, make_simulation=make_simulation or simulation, force=path.exists()
+            Scenario.model_validate(scenario),
+            path,
+            make_simulation=make_simulation or simulation,
+            force=path.exists(),
+            pictures=False,
         )
     except Exception as error:  # whatever it is, it is this case's alone
         return f"{type(error).__name__}: {error}"

@@ -112,7 +112,7 @@ def paper_runs(names: Mapping[str, float]) -> Iterator[dict[str, PaperRun]]:
         try:
             for name, spacing in names.items():
                 out = Path(folder) / name
-                run_scenario(paper_scene(name, spacing), out, make_simulation=Simulation)
+                run_scenario(paper_scene(name, spacing), out, make_simulation=Simulation, pictures=False)
                 runs[name] = PaperRun(name, Results.open(out))
             yield runs
         finally:

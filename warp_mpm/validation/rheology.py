@@ -475,7 +475,7 @@ def laws(quick: bool) -> Outcome:
     with TemporaryDirectory(prefix="warp-mpm-laws-") as folder:
         for number, name in enumerate(names):
             out = Path(folder) / str(number)
-            run_scenario(variant(name, spacing), out, make_simulation=Simulation)
+            run_scenario(variant(name, spacing), out, make_simulation=Simulation, pictures=False)
             results = Results.open(out)
             summary, series = results.summary, results.time_series
             measures = summary["mechanism_measures"]
