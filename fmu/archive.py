@@ -30,7 +30,7 @@ from warp_mpm.shipped import SCENARIOS
 
 _HERE = Path(__file__).parent
 _UNITS = _HERE / "units"
-_ROOT = _HERE.parent
+ROOT = _HERE.parent
 _COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
 _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
@@ -107,7 +107,7 @@ def build_python_unit(
     *,
     version: str | None = None,
     scenario: Path | None = None,
-    simulate_reference: bool = False,
+    simulated: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Build ``folder/<name>.fmu``.
 
@@ -117,8 +117,8 @@ def build_python_unit(
     folder: created if missing; an archive of the same name in it is replaced.
     version: instead of the project's version.
     scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
-    simulate_reference: run the simulator for the reference results of ``DebrisFlow``; those of the other units are
-        always there.
+    simulated: reference results of ``DebrisFlow``, from ``simulated_reference``; those of the other units are always
+        there.
 
     Raises
     ------
@@ -143,10 +143,9 @@ def build_python_unit(
             entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
         entries = {name: _mended(data) for name, data in _own_pythonfmu(entries, package).items()}
         if unit.name == "DebrisFlow":
-            own = _simulator_resources(scenario or DEFAULT_SCENARIO)
+            own = _simulator_resources(scenario_for(scenario))
             entries |= {f"resources/{name}": data for name, data in own.items()}
-            if simulate_reference:
-                entries |= _simulated_reference(stage / "reference", own)
+            entries |= {f"documentation/{name}": data for name, data in (simulated or {}).items()}
         entries |= documentation.entries(unit.interface, version)
         return write_archive(folder / f"{unit.name}.fmu", entries)
 
@@ -172,8 +171,8 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> Path:
 def _shipped_sources(unit: PythonUnit) -> dict[str, str]:
     names = (*_COMMON_MODULES, f"{unit.module}.py", *unit.other_modules)
     sources = {name: (_UNITS / name).read_text(encoding="utf-8") for name in names}
-    sources |= {name: (_ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
-    outside = _ROOT / "warp_mpm" / "quantities"
+    sources |= {name: (ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
+    outside = ROOT / "warp_mpm" / "quantities"
     sources |= {name: (outside / name).read_text(encoding="utf-8") for name in unit.quantity_modules}
     return {name: _IMPORT_FROM_OUTSIDE.sub(r"\1from .", text) for name, text in sources.items()}
 
@@ -189,11 +188,22 @@ def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
         raise BuildError(f"pythonfmu could not build {package}: {last}")
 
 
-def _simulator_resources(scenario: Path) -> dict[str, bytes]:
-    """The scenario that runs unless the importer names another, and which Python has the simulator."""
+def scenario_for(chosen: Path | None) -> Path:
+    """The scenario file inside ``DebrisFlow``.
+
+    Raises
+    ------
+    BuildError: it is not there.
+    """
+    scenario = chosen or DEFAULT_SCENARIO
     if not scenario.is_file():
         raise BuildError(f"The scenario {scenario} is not there; name one with --scenario.")
-    record = {"interpreter": sys.executable, "import_path": [str(_ROOT)]}
+    return scenario
+
+
+def _simulator_resources(scenario: Path) -> dict[str, bytes]:
+    """The scenario that runs unless the importer names another, and which Python has the simulator."""
+    record = {"interpreter": sys.executable, "import_path": [str(ROOT)]}
     return {
         SCENARIO: scenario.read_bytes(),
         RECORD: json.dumps(record, indent=2).encode(),
@@ -201,15 +211,20 @@ def _simulator_resources(scenario: Path) -> dict[str, bytes]:
     }
 
 
-def _simulated_reference(folder: Path, resources: Mapping[str, bytes]) -> dict[str, bytes]:
-    folder.mkdir()
-    for name, data in resources.items():
-        (folder / name).write_bytes(data)
-    try:
-        files = reference.simulated_files(folder)
-    except UnitError as error:
-        raise BuildError(str(error)) from None
-    return {f"documentation/{name}": data for name, data in files.items()}
+def simulated_reference(scenario: Path | None) -> dict[str, bytes]:
+    """Run the simulator for the reference results of ``DebrisFlow`` with a scenario, Set IIb if None.
+
+    Raises
+    ------
+    BuildError: the scenario is not there, or does not run.
+    """
+    with tempfile.TemporaryDirectory(prefix="fmu_build_") as temporary:
+        for name, data in _simulator_resources(scenario_for(scenario)).items():
+            (Path(temporary) / name).write_bytes(data)
+        try:
+            return reference.simulated_files(Path(temporary))
+        except UnitError as error:
+            raise BuildError(str(error)) from None
 
 
 def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, bytes]:

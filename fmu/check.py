@@ -64,7 +64,8 @@ def _valid(path: Path, folder: Path) -> str:
 def _complete(path: Path, folder: Path) -> str:
     with zipfile.ZipFile(path) as file:
         names = file.namelist()
-    for needed in ("documentation/index.html", "documentation/licenses/license.txt", "model.png"):
+    icon = "terminalsAndIcons/icon.png" if "terminalsAndIcons/terminalsAndIcons.xml" in names else "model.png"
+    for needed in ("documentation/index.html", "documentation/licenses/license.txt", icon):
         _demand(needed in names, f"{needed} is missing.")
     platforms = sorted({name.split("/")[1] for name in names if name.startswith("binaries/")})
     return f"page, licence, icon; binaries for {', '.join(platforms)}"
@@ -77,7 +78,7 @@ def _units(path: Path, folder: Path) -> str:
     units = {unit.name: unit for unit in description.unitDefinitions}
     for variable in description.modelVariables:
         _demand(bool(variable.description), f"{variable.name} has no description.")
-        if variable.type == "Real":
+        if variable.type in ("Real", "Float64"):
             _demand(variable.unit in units, f"{variable.name} has no unit.")
             _demand(units[variable.unit].baseUnit is not None, f"{variable.unit} has no SI base units.")
     return f"{len(description.modelVariables)} variables, {len(units)} units"
@@ -135,13 +136,12 @@ def _state(path: Path, folder: Path) -> str:
     with instance(path, folder, QUICK_SETTINGS) as unit:
         unit.initialize()
         unit.step(0.2)
-        state, time = unit.fmu.getFMUstate(), unit.time
-        data = unit.fmu.serializeFMUstate(state)
+        state, time = unit.save(), unit.time
+        data = unit.serialized(state)
         unit.step(0.1)
         first = unit.real_outputs()
-        for restored in (state, unit.fmu.deSerializeFMUstate(data)):
-            unit.fmu.setFMUstate(restored)
-            unit.time = time
+        for restored in (state, unit.deserialized(data)):
+            unit.restore(restored, time)
             unit.step(0.1)
             _demand(unit.real_outputs() == first, "a restored state does not go on as the first time.")
         return f"restored bit for bit, {len(data)} bytes serialized"
@@ -165,7 +165,7 @@ def _refusal(path: Path, folder: Path) -> str:
         name = next(
             name
             for name, v in unit.variables.items()
-            if v.causality == "parameter" and v.type == "Real" and v.min is not None
+            if v.causality == "parameter" and v.type in ("Real", "Float64") and v.min is not None
         )
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

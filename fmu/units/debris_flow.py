@@ -25,7 +25,7 @@ from .interface import (
     Unit,
     Variable,
 )
-from .slave import UnitError, UnitSlave
+from .slave import UnitError, UnitSlave, sealed
 from .worker_process import WorkerProcess
 
 SCENARIO = "scenario.json"
@@ -175,7 +175,7 @@ class DebrisFlowSlave(UnitSlave):
             "spacing": self["spacing"] or None,
             "driven": BARRIER_MOTION.name_of(self["barrier_motion"]) == "driven",
         }
-        if self.worker is None or settings != self.opened:
+        if self.worker is None or not self.worker.alive or settings != self.opened:
             self.close()
             self.worker = WorkerProcess(str(self.resources))
             try:
@@ -214,8 +214,7 @@ class DebrisFlowSlave(UnitSlave):
             self["time_ratio"] = 0.0
         self["message"] = ""
         self.overtopped_due = "overtopped_volume" not in answer
-        if not self.overtopped_due:
-            self["overtopped_volume"] = answer["overtopped_volume"]
+        self["overtopped_volume"] = answer.get("overtopped_volume", 0.0)  # until it is asked for
 
     def _get(self, kind: str, references: Sequence[int]) -> list[Any]:
         # It takes all material points, which the other outputs do not: counted only for an importer that asks, and from
@@ -263,7 +262,10 @@ class DebrisFlowSlave(UnitSlave):
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        snapshot = state["snapshot"]
-        if snapshot is not None:
-            snapshot = {**snapshot, "worker_state": snapshot["worker_state"].data()}
-        return json.dumps({**state, "snapshot": snapshot}).encode()
+        snapshot = state.get("snapshot")
+        try:
+            if snapshot is not None and isinstance(snapshot["worker_state"], WorkerState):
+                snapshot = {**snapshot, "worker_state": snapshot["worker_state"].data()}
+            return sealed(json.dumps({**state, "snapshot": snapshot}).encode())
+        except UnitError as error:  # no exception may go to the wrapper from here, see ``_fmu_state_from_bytes``
+            return sealed(json.dumps({"fault": f"The state could not be serialized: {error}"}).encode())

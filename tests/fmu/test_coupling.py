@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from fmu import archive
+from fmu import c_unit
 from warp_mpm import Scenario, Simulation
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,8 @@ system = documented("system")
 
 @pytest.fixture(scope="module")
 def folder(archives: dict[str, Path]) -> Path:
-    return archives["DebrisFlow"].parent
+    paths = [archives[name] for name in coupled.UNITS]
+    return paths[0].parent
 
 
 def monolithic(end: float, anchor: dict[str, float] | None = None) -> float:
@@ -106,9 +107,9 @@ def own(archives: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
     scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(OWN_SCENE)
     file = folder / "own.json"
     file.write_text(json.dumps(scenario.resolved()))
-    (unit,) = [unit for unit in archive.PYTHON_UNITS if unit.name == "DebrisFlow"]
-    archive.build_python_unit(unit, folder, scenario=file)
-    for name in ("BarrierSliding", "GroundAnchor"):
+    (unit,) = [unit for unit in c_unit.C_UNITS if unit.name == "DebrisFlowC"]
+    c_unit.build_c_unit(unit, folder, platforms=(c_unit.host_platform(),), scenario=file)
+    for name in ("BarrierSlidingC", "GroundAnchorC"):
         shutil.copy(archives[name], folder)
     return scenario, folder
 
@@ -232,7 +233,7 @@ def test_ten_line_script_runs(folder: Path) -> None:
         (["--end", "soon"], "--end: soon is not allowed; it must be a finite number greater than 0."),
         (["--step", "7"], "--step: 7 is not allowed; it must be at most --end, 6."),
         (["--spacing", "-0.1"], "--spacing: -0.1 is not allowed; it must be a finite number at least 0."),
-        (["--archives", "nowhere"], "--archives: nowhere must hold DebrisFlow, BarrierSliding, GroundAnchor; "),
+        (["--archives", "nowhere"], "--archives: nowhere must hold DebrisFlowC, BarrierSlidingC, GroundAnchorC; "),
     ],
 )
 def test_script_refuses_in_one_sentence(
