@@ -4,6 +4,7 @@
 
 #define START_TIME_LIMIT 60.0 /* [s] in which a worker must say that it is there */
 #define PATH_SIZE (2 * TEXT_SIZE)
+#define LOST "The state was lost with the simulator's process that kept it."
 #define PATIENCE 5.0          /* [s] in which a worker ends when its input does */
 
 static double seconds(void);
@@ -410,11 +411,12 @@ static int unit_restore(Unit *unit, Kept *kept) {
             unit->state.stale = 1;
             return 1;
         }
-        return refuse(unit, "The state was lost with the simulator's process that kept it.");
+        return refuse(unit, LOST);
     }
     if (!open_worker(unit)) return 0;
     unit->state.model.overtopped_due = 1;
     if (kept_here(unit, kept)) return ask_about(unit, "restore_state", kept);
+    if (!kept->data) return refuse(unit, LOST); /* with a worker that had ended before it was asked */
     Line line = request_for("import_state");
     put_named(&line, "data");
     put_string(&line, kept->data);

@@ -3,6 +3,13 @@
 #define _GNU_SOURCE /* POSIX beside the standard library, for units that start a process */
 #include "fmi2Functions.h"
 
+#ifdef FMI2_FUNCTION_PREFIX /* which the header as it comes with fmpy leaves out of account */
+#undef fmi2FullName
+#define fmi2Joined(prefix, name) prefix##name
+#define fmi2Prefixed(prefix, name) fmi2Joined(prefix, name)
+#define fmi2FullName(name) fmi2Prefixed(FMI2_FUNCTION_PREFIX, name)
+#endif
+
 #include "life.c"
 
 /* The unit and what its importer gave with it. */
@@ -59,6 +66,12 @@ static void path_of(char *uri) {
     *to = 0;
 }
 
+void fmi2FreeInstance(fmi2Component component) {
+    if (!component) return;
+    free_unit(UNIT(component));
+    free(component);
+}
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging_on) {
     (void)visible;
@@ -75,12 +88,6 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     tell(component);
     fmi2FreeInstance(component);
     return NULL;
-}
-
-void fmi2FreeInstance(fmi2Component component) {
-    if (!component) return;
-    free_unit(UNIT(component));
-    free(component);
 }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[]) {

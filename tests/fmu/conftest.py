@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -86,3 +88,26 @@ def open_unit(archives: dict[str, Path], unzipped: dict[str, Path]) -> Iterator[
 def host_class() -> type[Host]:
     """For tests that free their instance themselves."""
     return Host
+
+
+@pytest.fixture(scope="session")
+def c_compiler() -> list[str]:
+    """The command that compiles C for this machine."""
+    return [sys.executable, "-m", "ziglang", "cc"] if c_unit.has_cross_compiler() else ["cc"]
+
+
+@pytest.fixture(scope="session")
+def c_program(c_compiler: list[str], tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Path]:
+    """Compile a program of one file; once."""
+    made: dict[Path, Path] = {}
+
+    def compiled(source: Path) -> Path:
+        if source not in made:
+            program = tmp_path_factory.mktemp("host") / source.stem
+            command = [*c_compiler, "-Wall", "-Werror", "-o", program, source, "-ldl"]
+            done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            made[source] = program
+        return made[source]
+
+    return compiled
