@@ -108,6 +108,7 @@ def build_python_unit(
     version: str | None = None,
     scenario: Path | None = None,
     simulated: Mapping[str, bytes] | None = None,
+    recorded: bool = True,
 ) -> Path:
     """Build ``folder/<name>.fmu``.
 
@@ -119,6 +120,8 @@ def build_python_unit(
     scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
     simulated: reference results of ``DebrisFlow``, from ``simulated_reference``; those of the other units are always
         there.
+    recorded: whether ``DebrisFlow`` remembers this Python as the one that has the simulator; without, it is the same
+        file wherever it is built.
 
     Raises
     ------
@@ -143,7 +146,7 @@ def build_python_unit(
             entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
         entries = {name: _mended(data) for name, data in _own_pythonfmu(entries, package).items()}
         if unit.name == "DebrisFlow":
-            own = _simulator_resources(scenario_for(scenario))
+            own = _simulator_resources(scenario_for(scenario), recorded=recorded)
             entries |= {f"resources/{name}": data for name, data in own.items()}
             entries |= {f"documentation/{name}": data for name, data in (simulated or {}).items()}
         entries |= documentation.entries(unit.interface, version)
@@ -201,12 +204,12 @@ def scenario_for(chosen: Path | None) -> Path:
     return scenario
 
 
-def _simulator_resources(scenario: Path) -> dict[str, bytes]:
+def _simulator_resources(scenario: Path, *, recorded: bool = True) -> dict[str, bytes]:
     """The scenario that runs unless the importer names another, and which Python has the simulator."""
     record = {"interpreter": sys.executable, "import_path": [str(ROOT)]}
     return {
         SCENARIO: scenario.read_bytes(),
-        RECORD: json.dumps(record, indent=2).encode(),
+        **({RECORD: json.dumps(record, indent=2).encode()} if recorded else {}),
         "requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
     }
 

@@ -123,6 +123,7 @@ def build_c_unit(
     version: str | None = None,
     scenario: Path | None = None,
     simulated: Mapping[str, bytes] | None = None,
+    recorded: bool = True,
 ) -> Path:
     """Build ``folder/<name>.fmu``, its sources included.
 
@@ -134,6 +135,7 @@ def build_c_unit(
     version: instead of the project's version.
     scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
     simulated: reference results of ``DebrisFlow``, from ``archive.simulated_reference``.
+    recorded: whether ``DebrisFlow`` remembers this Python as the one that has the simulator.
 
     Raises
     ------
@@ -151,10 +153,9 @@ def build_c_unit(
     entries |= _binaries(unit, sources, chosen)
     entries |= documentation.entries(interface, version, packer="c")
     if unit.base == "DebrisFlow":
-        # The interpreter that the archive remembers is no part of what it is.
-        record = "\n".join([sys.executable, str(ROOT), ""])
         entries[f"resources/{SCENARIO}"] = scenario_for(scenario).read_bytes()
-        entries[f"resources/{worker_process.PLAIN_RECORD}"] = record.encode()
+        if recorded:
+            entries[f"resources/{worker_process.PLAIN_RECORD}"] = f"{sys.executable}\n{ROOT}\n".encode()
         entries["resources/requirements.txt"] = f"{PROJECT}=={project_version()}\n".encode()
         for name, data in (simulated or {}).items():
             entries[f"documentation/{name.replace(unit.base, unit.name)}"] = data

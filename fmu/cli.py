@@ -1,4 +1,4 @@
-"""The command line: `python -m fmu build | check | parameters | benchmark`.
+"""The command line: `python -m fmu build | release | check | parameters | benchmark`.
 
 Exit codes: 0 done, 1 a check failed, 2 the input cannot be used (one sentence says why, on the standard error stream).
 """
@@ -69,6 +69,33 @@ def build(
     _check_folder(out)
     try:
         _build(chosen, out, scenario, tuple(platform) if platform else None, by_name=only is not None)
+    except archive.BuildError as error:
+        _refuse(str(error))
+    except OSError as error:
+        _refuse(f"{out} cannot be written: {error.strerror or error}.")
+
+
+@app.command(epilog="Example: python -m fmu release --out dist")
+def release(
+    out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
+    platform: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Platform of the C units; may be repeated.",
+            show_default="all with ziglang installed, else this machine's",
+        ),
+    ] = None,
+) -> None:
+    """Build what a release carries: all units, the system of them (SSP), and a manifest of hashes.
+
+    The same sources give the same bytes in any folder, on any day. The simulator's units remember no Python here.
+    """
+    from fmu import archive
+    from fmu.release import build_release
+
+    _check_folder(out)
+    try:
+        build_release(out, platforms=tuple(platform) if platform else None, tell=_tell)
     except archive.BuildError as error:
         _refuse(str(error))
     except OSError as error:

@@ -232,4 +232,5 @@ def test_two_units_in_one_program(
     assert done.returncode == 0, done.stderr
     done = run([program, *guids])
     assert done.returncode == 0, done.returncode
-    assert float(done.stdout) == barrier["barrier_displacement"]
+    # The program counts its steps, the importer adds them up.
+    assert float(done.stdout) == pytest.approx(barrier["barrier_displacement"], rel=1e-12)
