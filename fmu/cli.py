@@ -181,12 +181,10 @@ def parameters(
     as_json: Annotated[bool, typer.Option("--json", help="Print the values as JSON, SI units.")] = False,
 ) -> None:
     """Start values of the closed-form unit for a scenario: with the paper's λ and τ, and with fitted ones."""
-    from xml.etree.ElementTree import indent, tostring
-
     from analytic.cli.terminal import number, print_json, print_table
     from analytic.scene import read_scene
     from fmu import start_values
-    from fmu.system import parameter_set
+    from fmu.system import as_xml, parameter_set
     from fmu.units.barrier_sliding import INTERFACE
 
     if variant not in start_values.WAYS:
@@ -200,9 +198,7 @@ def parameters(
     except ValueError as error:  # of the scenario or the closed form: one sentence each
         _refuse(str(error))
     if as_ssv:
-        root = parameter_set(INTERFACE, values[variant])
-        indent(root)
-        typer.echo(tostring(root, "unicode"))
+        typer.echo(as_xml(parameter_set(INTERFACE, values[variant])).decode())
     elif as_json:
         print_json({**values, "notes": {way: start_values.notes(scene, way) for way in values}})
     else:
@@ -273,7 +269,7 @@ def _build(
         built = c_unit.build_c_unit(unit, out, platforms=platforms, scenario=scenario, simulated=simulated)
         _tell(built, f"for {', '.join(c_unit.platforms_of(built))}")
     if c_units and platforms is None and not c_unit.has_cross_compiler():
-        typer.echo(c_unit.needs_cross_compiler("The units in C for other platforms"), err=True)
+        typer.echo(c_unit.needs_cross_compiler("Building the units in C for other platforms"), err=True)
     for packed in archive.PYTHON_UNITS:
         if packed.name in names:
             if packed.name == "DebrisFlow" and simulated is None:

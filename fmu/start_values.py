@@ -14,7 +14,7 @@ from typing import Any
 
 from analytic.fitted import CALIBRATED, beyond_fit, coefficients
 from analytic.scene import ASSUMED_RISE_RATIO, Scene
-from fmu.units.barrier_sliding import VARIANT
+from fmu.units.barrier_sliding import INTERFACE, VARIANT
 
 PAPER = "paper"
 
@@ -61,7 +61,8 @@ def start_values(scene: Scene, way: str) -> dict[str, Any]:
     The arrival is that of a front which goes on at the flow's speed.
     """
     values = scene_parameters(scene) | {"arrival_time": max(scene.distance, 0.0) / scene.speed}
-    return values | force_parameters(scene, way)
+    values |= force_parameters(scene, way)
+    return {variable.name: values[variable.name] for variable in INTERFACE.variables if variable.name in values}
 
 
 def notes(scene: Scene, way: str) -> tuple[str, ...]:

@@ -103,9 +103,9 @@ def write_system(archives: Path, path: Path, *, spacing: float | None = None) ->
     """
     scenario = scenario_in(archives / f"{COMPONENTS['flow'][0]}.fmu")
     values = parameter_values(scenario, spacing)
-    entries = {"SystemStructure.ssd": _xml(structure(scenario.output.end_time_s))}
+    entries = {"SystemStructure.ssd": as_xml(structure(scenario.output.end_time_s))}
     for component, (unit, interface) in COMPONENTS.items():
-        entries[f"resources/{component}.ssv"] = _xml(parameter_set(interface, values[component]))
+        entries[f"resources/{component}.ssv"] = as_xml(parameter_set(interface, values[component]))
         entries[f"resources/{unit}.fmu"] = (archives / f"{unit}.fmu").read_bytes()
     return write_archive(path, entries)
 
@@ -183,6 +183,14 @@ def parameter_set(interface: Interface, values: Mapping[str, float | str]) -> El
     return root
 
 
+def as_xml(root: Element) -> bytes:
+    """The file of a root element."""
+    for prefix, address in NAMESPACES.items():
+        register_namespace(prefix, address)
+    indent(root)
+    return tostring(root, "UTF-8", xml_declaration=True)
+
+
 def _units(root: Element, room: str, interfaces: list[Interface], used: set[str]) -> None:
     """Declare the units that are used, which the standard demands of the file that uses them."""
     collected: dict[str, Element] = {}
@@ -208,10 +216,3 @@ def _element(room: str, tag: str, attributes: Mapping[str, str] | None = None) -
 
 def _child(parent: Element, room: str, tag: str, attributes: Mapping[str, str] | None = None) -> Element:
     return SubElement(parent, f"{{{NAMESPACES[room]}}}{tag}", dict(attributes or {}))
-
-
-def _xml(root: Element) -> bytes:
-    for prefix, address in NAMESPACES.items():
-        register_namespace(prefix, address)
-    indent(root)
-    return tostring(root, "UTF-8", xml_declaration=True)
