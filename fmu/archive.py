@@ -36,13 +36,34 @@ _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
 _IMPORT_FROM_OUTSIDE = re.compile(r"^( *)from (?:analytic|warp_mpm\.quantities)\.", re.MULTILINE)
 
-_WRAPPER_FAULTS = {
-    # pythonfmu 0.7.0, linux64: when the process exits, a function that runs after the destructors releases the
-    # wrapper's state a second time, which corrupts the host's memory ("corrupted double-linked list"). The destructor
-    # does the same work, so the function is made to return at once. Place of its first instruction after the marker.
-    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (0x2F7E4, b"\x55", b"\xc3"),
+
+@dataclass(frozen=True)
+class Mend:
+    """What is wrong with a wrapper, and the bytes to put in its place."""
+
+    start: int
+    end: int
+    """Offsets in the file, within which it stands."""
+    before: bytes
+    after: bytes
+    count: int
+    """How often it stands there."""
+
+
+_WRAPPER_FAULTS: dict[str, tuple[Mend, ...]] = {
+    # pythonfmu 0.7.0, linux64.
+    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (
+        # When the process exits, a function that runs after the destructors releases the wrapper's state a second time,
+        # which corrupts the host's memory ("corrupted double-linked list"). The destructor does the same work, so the
+        # function is made to return at once: its first instruction after the marker.
+        Mend(0x2F7E4, 0x2F7E5, b"\x55", b"\xc3", 1),
+        # Whatever exception a unit raises is answered with fatal, after which an importer may call no instance of any
+        # unit. A refusal is an error: what the handlers of twenty functions return, and the status of their message.
+        Mend(0x14F80, 0x167B1, b"\xb8\x04\x00\x00\x00", b"\xb8\x03\x00\x00\x00", 20),
+        Mend(0x14F80, 0x167B1, b"\xbe\x04\x00\x00\x00", b"\xbe\x03\x00\x00\x00", 20),
+    ),
 }
-"""By the SHA-256 of a wrapper: offset in the file, the byte that stands there, and the byte to put there."""
+"""By the SHA-256 of a wrapper."""
 
 _SCRIPT = """\
 import sys
@@ -247,11 +268,10 @@ def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, byte
 
 
 def _mended(data: bytes) -> bytes:
-    """The wrapper without its known fault; any other file, or a wrapper of another version, as it is."""
-    offset, before, after = _WRAPPER_FAULTS.get(hashlib.sha256(data).hexdigest(), (0, b"", b""))
-    if not before:
-        return data
-    end = offset + len(before)
-    if data[offset:end] != before:
-        raise BuildError("The wrapper of pythonfmu is not the one that the correction was made for.")
-    return data[:offset] + after + data[end:]
+    """The wrapper without its known faults; any other file, or a wrapper of another version, as it is."""
+    for mend in _WRAPPER_FAULTS.get(hashlib.sha256(data).hexdigest(), ()):
+        place = data[mend.start : mend.end]
+        if place.count(mend.before) != mend.count:
+            raise BuildError("The wrapper of pythonfmu is not the one that the correction was made for.")
+        data = data[: mend.start] + place.replace(mend.before, mend.after) + data[mend.end :]
+    return data

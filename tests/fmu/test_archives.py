@@ -409,9 +409,10 @@ def test_nothing_is_printed_to_the_hosts_output(archives: dict[str, Path]) -> No
     assert run_python(code, archives["BarrierSliding"], archives["GroundAnchor"]) == ""
 
 
-def test_fault_of_the_wrapper_is_mended(archives: dict[str, Path]) -> None:
+def test_faults_of_the_wrapper_are_mended(archives: dict[str, Path]) -> None:
     """At the host's exit the wrapper writes into memory that it has freed. Valgrind shows it, a crash is rare, so the
-    one byte that prevents it is looked for. A new version of pythonfmu needs a new look at its wrapper."""
+    one byte that prevents it is looked for. The others make an error of what was fatal: twenty functions, what they
+    return and log. A new version of pythonfmu needs a new look at its wrapper."""
     import pythonfmu
 
     folder = Path(pythonfmu.__file__).parent / "resources" / "binaries" / "linux64"
@@ -420,9 +421,12 @@ def test_fault_of_the_wrapper_is_mended(archives: dict[str, Path]) -> None:
         mended = file.read("binaries/linux64/BarrierSliding.so")
     assert len(mended) == len(plain)
     places = [place for place in range(len(plain)) if plain[place] != mended[place]]
-    assert len(places) == 1
-    assert plain[places[0] - 4 : places[0]] == b"\xf3\x0f\x1e\xfa"  # the marker at a function's entry
-    assert mended[places[0]] == 0xC3  # return
+    *statuses, exit_place = places
+    assert plain[exit_place - 4 : exit_place] == b"\xf3\x0f\x1e\xfa"  # the marker at a function's entry
+    assert mended[exit_place] == 0xC3  # return
+    assert len(statuses) == 2 * 20
+    assert {(plain[place], mended[place]) for place in statuses} == {(4, 3)}
+    assert {plain[place - 1] for place in statuses} == {0xB8, 0xBE}  # into the registers of a result, of an argument
 
 
 def test_freed_instance_is_gone_at_once(archives: dict[str, Path], unzipped: dict[str, Path]) -> None:

@@ -51,10 +51,10 @@ def test_many_random_calls(
 
 
 def refused(call: Callable[..., Any], *arguments: Any, **named: Any) -> None:
-    """The call is answered with a discarded step or an error; pythonfmu has nothing but fatal for the latter."""
+    """The call is answered with a discarded step or an error."""
     with pytest.raises(FMICallException) as caught:
         call(*arguments, **named)
-    assert caught.value.status >= 2
+    assert caught.value.status in (2, 3)
 
 
 @EACH
