@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -108,6 +109,16 @@ class Unit:
     def free(self) -> None:
         """Give the instance back; its library stays loaded."""
         (self.fmu.fmi3FreeInstance if self.fmi3 else self.fmu.fmi2FreeInstance)(self.fmu.component)
+
+
+@contextlib.contextmanager
+def instance_of(path: Path) -> Iterator[Unit]:
+    """An instance of the archive, unpacked into a folder of its own; instance and folder are gone at the end."""
+    with (
+        tempfile.TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True) as folder,
+        instance(path, Path(folder)) as unit,
+    ):
+        yield unit
 
 
 @contextlib.contextmanager

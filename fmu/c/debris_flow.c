@@ -289,17 +289,24 @@ static int open_worker(Unit *unit) {
     return 0;
 }
 
+/* The outputs that take all material points. */
+static int take_counts(Unit *unit) {
+    double *values = unit->state.values;
+    return number_of(unit->own.answer, "overtopped_volume", &values[OVERTOPPED_VOLUME]) &&
+           number_of(unit->own.answer, "gauge_depth", &values[GAUGE_DEPTH]);
+}
+
 /* Outputs from the last answer, by their names in it. */
 static int take(Unit *unit) {
     double *values = unit->state.values;
     const char *answer = unit->own.answer;
     for (int i = 0; i < VARIABLE_COUNT; i++) {
-        if (TABLE[i].causality != OUTPUT || TABLE[i].kind != REAL || i == OVERTOPPED_VOLUME || i == TIME_RATIO) continue;
+        if (TABLE[i].causality != OUTPUT || TABLE[i].kind != REAL || i == OVERTOPPED_VOLUME || i == GAUGE_DEPTH || i == TIME_RATIO) continue;
         if (!number_of(answer, TABLE[i].name, &values[i]))
             return refuse(unit, "The simulator's process sent no %s.", TABLE[i].name);
     }
-    unit->state.model.overtopped_due = !number_of(answer, "overtopped_volume", &values[OVERTOPPED_VOLUME]);
-    if (unit->state.model.overtopped_due) values[OVERTOPPED_VOLUME] = 0; /* until it is asked for */
+    unit->state.model.counts_due = !take_counts(unit);
+    if (unit->state.model.counts_due) values[OVERTOPPED_VOLUME] = values[GAUGE_DEPTH] = 0; /* until they are asked for */
     unit->state.texts[TABLE[MESSAGE].text][0] = 0;
     return 1;
 }
@@ -328,8 +335,9 @@ static int unit_step(Unit *unit, double end) {
     else put_text(&line, "null");
     put_named(&line, "external_force");
     put_number(&line, values[EXTERNAL_FORCE]);
-    put_named(&line, "overtopped");
-    put_text(&line, model->overtopped_wanted ? "true" : "false");
+    put_named(&line, "gauge");
+    if (model->counts_wanted) put_number(&line, values[GAUGE_POSITION]);
+    else put_text(&line, "null");
     double started = seconds();
     if (!ask(unit, "step", &line, time_limit_of(unit))) return 0;
     model->wall_time += seconds() - started;
@@ -342,18 +350,16 @@ static int unit_rate(Unit *unit, int reference, double *rate) {
     return refuse(unit, "This unit does not offer derivatives.");
 }
 
-/* Counting it takes all material points: only for an importer that asks, and from then on within each step. */
+/* Counted for an importer that asks, and from then on within each step. */
 static int unit_read(Unit *unit, int reference) {
     Model *model = &unit->state.model;
-    if (reference != OVERTOPPED_VOLUME || !model->overtopped_due) return 1;
-    model->overtopped_due = 0;
-    model->overtopped_wanted = 1;
-    Line line = request_for("overtopped_volume");
-    if (ask(unit, "overtopped_volume", &line, time_limit_of(unit)) &&
-        number_of(unit->own.answer, "overtopped_volume", &unit->state.values[OVERTOPPED_VOLUME]))
-        return 1;
-    snprintf(unit->state.texts[TABLE[MESSAGE].text], TEXT_SIZE, "%s", unit->message);
-    return 0;
+    if ((reference != OVERTOPPED_VOLUME && reference != GAUGE_DEPTH) || !model->counts_due) return 1;
+    model->counts_due = 0;
+    model->counts_wanted = 1;
+    Line line = request_for("count");
+    put_named(&line, "gauge");
+    put_number(&line, unit->state.values[GAUGE_POSITION]);
+    return ask(unit, "count", &line, time_limit_of(unit)) && take_counts(unit);
 }
 
 static void unit_close(Unit *unit) { close_worker(unit, PATIENCE); }
@@ -414,7 +420,7 @@ static int unit_restore(Unit *unit, Kept *kept) {
         return refuse(unit, LOST);
     }
     if (!open_worker(unit)) return 0;
-    unit->state.model.overtopped_due = 1;
+    unit->state.model.counts_due = 1;
     if (kept_here(unit, kept)) return ask_about(unit, "restore_state", kept);
     if (!kept->data) return refuse(unit, LOST); /* with a worker that had ended before it was asked */
     Line line = request_for("import_state");

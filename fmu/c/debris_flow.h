@@ -6,7 +6,7 @@
 
 typedef struct {
     double start_time, wall_time; /* wall time that the steps took [s] */
-    int overtopped_due, overtopped_wanted;
+    int counts_due, counts_wanted; /* of what takes all material points */
 } Model;
 
 /* What a state holds beside: the worker keeps it under a number, or, if that worker has ended, its text is here. */

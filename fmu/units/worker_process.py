@@ -21,7 +21,7 @@ from typing import IO, Any
 
 from .slave import UnitError
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Version of the requests and answers; the worker names its own when it starts."""
 
 RECORDED = (

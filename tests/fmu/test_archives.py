@@ -170,6 +170,25 @@ def test_reference_results_are_reproduced(name: str, archives: dict[str, Path]) 
         assert np.allclose(found[column], values, rtol=1e-9, atol=1e-9 * max(1e-9, float(np.abs(values).max()))), column
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith("BarrierSliding")])
+def test_reference_results_of_every_way_to_drive_a_unit(name: str, archives: dict[str, Path], tmp_path: Path) -> None:
+    """The closed form, and a force from outside; results that were changed are told."""
+    (result,) = (r for r in check_archive(archives[name]) if r.name == "reference results")
+    assert result.passed, result.detail
+    assert result.detail.endswith(", driven in 2 ways")
+    with zipfile.ZipFile(archives[name]) as file:
+        entries = {entry: file.read(entry) for entry in file.namelist()}
+    assert entries[f"documentation/{name}_force_input_start.csv"] == b'"impact_force_source"\n2\n'
+    lines = entries[f"documentation/{name}_force_input_ref.csv"].splitlines()
+    entries[f"documentation/{name}_force_input_ref.csv"] = b"\n".join(
+        [*lines[:-1], lines[-1].replace(b"4.0,", b"4.0,9", 1)]
+    )
+    changed = archive.write_archive(tmp_path / archives[name].name, entries)
+    (result,) = (r for r in check_archive(changed) if r.name == "reference results")
+    assert not result.passed
+    assert f"the reference results {name}_force_input are missed by" in result.detail
+
+
 def _table(text: str) -> tuple[list[str], list[list[float]]]:
     rows = list(csv.reader(io.StringIO(text)))
     return rows[0], [[float(cell) for cell in row] for row in rows[1:]]
