@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: run test test-browser coverage lint validate accuracy docs clean
+.PHONY: run test test-browser coverage lint validate accuracy docs fmus clean
 
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -46,6 +46,10 @@ accuracy: $(VENV)/.run
 	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --quick --page docs/accuracy.md
 	$(BIN)/python -m warp_mpm accuracy scenarios/set_iib.json --quick --page docs/accuracy.md
 	$(BIN)/python -m warp_mpm accuracy scenarios/case_1.json --check --until 4 --page docs/accuracy.md
+
+# Every unit for every platform, the system of them, and SHA256SUMS; the same bytes wherever and whenever.
+fmus: $(VENV)/.test
+	$(BIN)/python -m fmu release --out dist
 
 docs: $(VENV)/.test
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict -f docs/site/mkdocs.yml   # pages in build/site

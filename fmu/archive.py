@@ -30,19 +30,40 @@ from warp_mpm.shipped import SCENARIOS
 
 _HERE = Path(__file__).parent
 _UNITS = _HERE / "units"
-_ROOT = _HERE.parent
+ROOT = _HERE.parent
 _COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
 _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
 _IMPORT_FROM_OUTSIDE = re.compile(r"^( *)from (?:analytic|warp_mpm\.quantities)\.", re.MULTILINE)
 
-_WRAPPER_FAULTS = {
-    # pythonfmu 0.7.0, linux64: when the process exits, a function that runs after the destructors releases the
-    # wrapper's state a second time, which corrupts the host's memory ("corrupted double-linked list"). The destructor
-    # does the same work, so the function is made to return at once. Place of its first instruction after the marker.
-    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (0x2F7E4, b"\x55", b"\xc3"),
+
+@dataclass(frozen=True)
+class Mend:
+    """What is wrong with a wrapper, and the bytes to put in its place."""
+
+    start: int
+    end: int
+    """Offsets in the file, within which it stands."""
+    before: bytes
+    after: bytes
+    count: int
+    """How often it stands there."""
+
+
+_WRAPPER_FAULTS: dict[str, tuple[Mend, ...]] = {
+    # pythonfmu 0.7.0, linux64.
+    "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9": (
+        # When the process exits, a function that runs after the destructors releases the wrapper's state a second time,
+        # which corrupts the host's memory ("corrupted double-linked list"). The destructor does the same work, so the
+        # function is made to return at once: its first instruction after the marker.
+        Mend(0x2F7E4, 0x2F7E5, b"\x55", b"\xc3", 1),
+        # Whatever exception a unit raises is answered with fatal, after which an importer may call no instance of any
+        # unit. A refusal is an error: what the handlers of twenty functions return, and the status of their message.
+        Mend(0x14F80, 0x167B1, b"\xb8\x04\x00\x00\x00", b"\xb8\x03\x00\x00\x00", 20),
+        Mend(0x14F80, 0x167B1, b"\xbe\x04\x00\x00\x00", b"\xbe\x03\x00\x00\x00", 20),
+    ),
 }
-"""By the SHA-256 of a wrapper: offset in the file, the byte that stands there, and the byte to put there."""
+"""By the SHA-256 of a wrapper."""
 
 _SCRIPT = """\
 import sys
@@ -107,7 +128,8 @@ def build_python_unit(
     *,
     version: str | None = None,
     scenario: Path | None = None,
-    simulate_reference: bool = False,
+    simulated: Mapping[str, bytes] | None = None,
+    recorded: bool = True,
 ) -> Path:
     """Build ``folder/<name>.fmu``.
 
@@ -117,8 +139,10 @@ def build_python_unit(
     folder: created if missing; an archive of the same name in it is replaced.
     version: instead of the project's version.
     scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
-    simulate_reference: run the simulator for the reference results of ``DebrisFlow``; those of the other units are
-        always there.
+    simulated: reference results of ``DebrisFlow``, from ``simulated_reference``; those of the other units are always
+        there.
+    recorded: whether ``DebrisFlow`` remembers this Python as the one that has the simulator; without, it is the same
+        file wherever it is built.
 
     Raises
     ------
@@ -143,10 +167,9 @@ def build_python_unit(
             entries = {info.filename: plain.read(info) for info in plain.infolist() if not info.is_dir()}
         entries = {name: _mended(data) for name, data in _own_pythonfmu(entries, package).items()}
         if unit.name == "DebrisFlow":
-            own = _simulator_resources(scenario or DEFAULT_SCENARIO)
+            own = _simulator_resources(scenario_for(scenario), recorded=recorded)
             entries |= {f"resources/{name}": data for name, data in own.items()}
-            if simulate_reference:
-                entries |= _simulated_reference(stage / "reference", own)
+            entries |= {f"documentation/{name}": data for name, data in (simulated or {}).items()}
         entries |= documentation.entries(unit.interface, version)
         return write_archive(folder / f"{unit.name}.fmu", entries)
 
@@ -172,8 +195,8 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> Path:
 def _shipped_sources(unit: PythonUnit) -> dict[str, str]:
     names = (*_COMMON_MODULES, f"{unit.module}.py", *unit.other_modules)
     sources = {name: (_UNITS / name).read_text(encoding="utf-8") for name in names}
-    sources |= {name: (_ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
-    outside = _ROOT / "warp_mpm" / "quantities"
+    sources |= {name: (ROOT / "analytic" / name).read_text(encoding="utf-8") for name in unit.analytic_modules}
+    outside = ROOT / "warp_mpm" / "quantities"
     sources |= {name: (outside / name).read_text(encoding="utf-8") for name in unit.quantity_modules}
     return {name: _IMPORT_FROM_OUTSIDE.sub(r"\1from .", text) for name, text in sources.items()}
 
@@ -189,27 +212,43 @@ def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
         raise BuildError(f"pythonfmu could not build {package}: {last}")
 
 
-def _simulator_resources(scenario: Path) -> dict[str, bytes]:
-    """The scenario that runs unless the importer names another, and which Python has the simulator."""
+def scenario_for(chosen: Path | None) -> Path:
+    """The scenario file inside ``DebrisFlow``.
+
+    Raises
+    ------
+    BuildError: it is not there.
+    """
+    scenario = chosen or DEFAULT_SCENARIO
     if not scenario.is_file():
         raise BuildError(f"The scenario {scenario} is not there; name one with --scenario.")
-    record = {"interpreter": sys.executable, "import_path": [str(_ROOT)]}
+    return scenario
+
+
+def _simulator_resources(scenario: Path, *, recorded: bool = True) -> dict[str, bytes]:
+    """The scenario that runs unless the importer names another, and which Python has the simulator."""
+    record = {"interpreter": sys.executable, "import_path": [str(ROOT)]}
     return {
         SCENARIO: scenario.read_bytes(),
-        RECORD: json.dumps(record, indent=2).encode(),
+        **({RECORD: json.dumps(record, indent=2).encode()} if recorded else {}),
         "requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
     }
 
 
-def _simulated_reference(folder: Path, resources: Mapping[str, bytes]) -> dict[str, bytes]:
-    folder.mkdir()
-    for name, data in resources.items():
-        (folder / name).write_bytes(data)
-    try:
-        files = reference.simulated_files(folder)
-    except UnitError as error:
-        raise BuildError(str(error)) from None
-    return {f"documentation/{name}": data for name, data in files.items()}
+def simulated_reference(scenario: Path | None) -> dict[str, bytes]:
+    """Run the simulator for the reference results of ``DebrisFlow`` with a scenario, Set IIb if None.
+
+    Raises
+    ------
+    BuildError: the scenario is not there, or does not run.
+    """
+    with tempfile.TemporaryDirectory(prefix="fmu_build_") as temporary:
+        for name, data in _simulator_resources(scenario_for(scenario)).items():
+            (Path(temporary) / name).write_bytes(data)
+        try:
+            return reference.simulated_files(Path(temporary))
+        except UnitError as error:
+            raise BuildError(str(error)) from None
 
 
 def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, bytes]:
@@ -229,11 +268,10 @@ def _own_pythonfmu(entries: Mapping[str, bytes], package: str) -> dict[str, byte
 
 
 def _mended(data: bytes) -> bytes:
-    """The wrapper without its known fault; any other file, or a wrapper of another version, as it is."""
-    offset, before, after = _WRAPPER_FAULTS.get(hashlib.sha256(data).hexdigest(), (0, b"", b""))
-    if not before:
-        return data
-    end = offset + len(before)
-    if data[offset:end] != before:
-        raise BuildError("The wrapper of pythonfmu is not the one that the correction was made for.")
-    return data[:offset] + after + data[end:]
+    """The wrapper without its known faults; any other file, or a wrapper of another version, as it is."""
+    for mend in _WRAPPER_FAULTS.get(hashlib.sha256(data).hexdigest(), ()):
+        place = data[mend.start : mend.end]
+        if place.count(mend.before) != mend.count:
+            raise BuildError("The wrapper of pythonfmu is not the one that the correction was made for.")
+        data = data[: mend.start] + place.replace(mend.before, mend.after) + data[mend.end :]
+    return data

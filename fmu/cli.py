@@ -1,4 +1,4 @@
-"""The command line: `python -m fmu build | check | benchmark`.
+"""The command line: `python -m fmu build | release | check | parameters | benchmark`.
 
 Exit codes: 0 done, 1 a check failed, 2 the input cannot be used (one sentence says why, on the standard error stream).
 """
@@ -23,7 +23,7 @@ DEFAULT_FOLDER = Path("build/fmu")
 
 app = typer.Typer(
     cls=ScenarioCommandLine,
-    help="FMI 2.0 co-simulation units of the closed-form model and of the simulator.",
+    help="Co-simulation units (FMI 2.0 and 3.0) of the closed-form model and of the simulator.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -47,18 +47,19 @@ def build(
     platform: Annotated[
         list[str] | None,
         typer.Option(
-            help="Platform of the C unit: linux64, win64, darwin64; may be repeated.",
+            help="Platform of the C units: linux64, linux-aarch64, win64, darwin64; may be repeated.",
             show_default="all with ziglang installed, else this machine's",
         ),
     ] = None,
 ) -> None:
-    """Build the units: BarrierSliding, BarrierSlidingC (plain C), GroundAnchor, DebrisFlow.
+    """Build the units BarrierSliding, GroundAnchor and DebrisFlow: packed by pythonfmu, in C, and in C for FMI 3.0.
 
-    The same sources give the same bytes. DebrisFlow remembers this Python as the one that runs its simulator.
+    The names of those in C end in C and C3. The same sources give the same bytes. DebrisFlow remembers this Python as
+    the one that runs its simulator.
     """
     from fmu import archive, c_unit
 
-    names = [*(unit.name for unit in archive.PYTHON_UNITS), c_unit.INTERFACE.name]
+    names = [unit.name for unit in archive.PYTHON_UNITS] + [unit.name for unit in c_unit.C_UNITS]
     chosen = only or names
     unknown = [name for name in chosen if name not in names]
     if unknown:
@@ -67,14 +68,34 @@ def build(
         _check_scenario(scenario)
     _check_folder(out)
     try:
-        if c_unit.INTERFACE.name in chosen:  # first, because it is the one that may lack what it needs
-            built = c_unit.build_c_unit(out, platforms=tuple(platform) if platform else None)
-            _tell(built, f"for {', '.join(c_unit.platforms_of(built))}")
-            if platform is None and not c_unit.has_cross_compiler():
-                typer.echo(c_unit.needs_cross_compiler(f"{built.name} for other platforms"), err=True)
-        for unit in archive.PYTHON_UNITS:
-            if unit.name in chosen:
-                _tell(archive.build_python_unit(unit, out, scenario=scenario, simulate_reference=True))
+        _build(chosen, out, scenario, tuple(platform) if platform else None, by_name=only is not None)
+    except archive.BuildError as error:
+        _refuse(str(error))
+    except OSError as error:
+        _refuse(f"{out} cannot be written: {error.strerror or error}.")
+
+
+@app.command(epilog="Example: python -m fmu release --out dist")
+def release(
+    out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
+    platform: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Platform of the C units; may be repeated.",
+            show_default="all with ziglang installed, else this machine's",
+        ),
+    ] = None,
+) -> None:
+    """Build what a release carries: all units, the system of them (SSP), and a manifest of hashes.
+
+    The same sources give the same bytes in any folder, on any day. The simulator's units remember no Python here.
+    """
+    from fmu import archive
+    from fmu.release import build_release
+
+    _check_folder(out)
+    try:
+        build_release(out, platforms=tuple(platform) if platform else None, tell=_tell)
     except archive.BuildError as error:
         _refuse(str(error))
     except OSError as error:
@@ -123,15 +144,20 @@ def check(
             archives = [file for file in files or () if file.suffix == ".fmu"]
             if not files:
                 archives = [archive.build_python_unit(unit, folder) for unit in archive.PYTHON_UNITS]
-                archives.append(c_unit.build_c_unit(folder, platforms=(c_unit.host_platform(),)))
+                host = (c_unit.host_platform(),)
+                archives += [
+                    c_unit.build_c_unit(unit, folder, platforms=host)
+                    for unit in c_unit.C_UNITS
+                    if c_unit.offered(unit, host[0])
+                ]
             for file in archives:
                 passed &= _prove(file, content, as_json)
             scenarios = [file for file in files or () if file.suffix == ".json"]
             if scenarios:
                 _check_folder(out)
-                unit = archive.build_python_unit(archive.PYTHON_UNITS[0], folder)
+                closed_form = archive.build_python_unit(archive.PYTHON_UNITS[0], folder)
             for file in scenarios:
-                _compare(file, unit, out, spacing, until, device, content, as_json)
+                _compare(file, closed_form, out, spacing, until, device, content, as_json)
         except archive.BuildError as error:
             _refuse(str(error))
     if as_json:
@@ -140,6 +166,52 @@ def check(
         print_json(content)
     if not passed:
         raise typer.Exit(FAILED)
+
+
+@app.command(
+    epilog="Examples: python -m fmu parameters scenarios/set_iib.json; "
+    "python -m fmu parameters scenarios/set_iib.json --ssv > barrier.ssv"
+)
+def parameters(
+    scenario: Annotated[Path, typer.Argument(help="Scenario file or run folder of the simulator.")],
+    variant: Annotated[
+        str, typer.Option(help="Of what --ssv prints: paper or calibrated. The others print both.")
+    ] = "calibrated",
+    as_ssv: Annotated[bool, typer.Option("--ssv", help="Print an SSP parameter file (SSV).")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the values as JSON, SI units.")] = False,
+) -> None:
+    """Start values of the closed-form unit for a scenario: with the paper's λ and τ, and with fitted ones."""
+    from analytic.cli.terminal import number, print_json, print_table
+    from analytic.scene import read_scene
+    from fmu import start_values
+    from fmu.system import as_xml, parameter_set
+    from fmu.units.barrier_sliding import INTERFACE
+
+    if variant not in start_values.WAYS:
+        _refuse(f"--variant = {variant} is not allowed; it must be one of {', '.join(start_values.WAYS)}.")
+    if as_ssv and as_json:
+        _refuse("--ssv and --json are two forms of one output; it must be one of them.")
+    try:
+        scene = read_scene(scenario)
+        scene.impact()
+        values = {way: start_values.start_values(scene, way) for way in start_values.WAYS}
+    except ValueError as error:  # of the scenario or the closed form: one sentence each
+        _refuse(str(error))
+    if as_ssv:
+        typer.echo(as_xml(parameter_set(INTERFACE, values[variant])).decode())
+    elif as_json:
+        print_json({**values, "notes": {way: start_values.notes(scene, way) for way in values}})
+    else:
+        names = [v.name for v in INTERFACE.of("parameter") if any(v.name in chosen for chosen in values.values())]
+        table = {v.name: v for v in INTERFACE.variables}
+        rows = []
+        for name in names:
+            unit = table[name].unit.name if table[name].kind == "Real" else ""
+            cells = [values[way].get(name, table[name].start) for way in start_values.WAYS]
+            shown = [str(cell).lower() if isinstance(cell, bool) else number(cell, 6) for cell in cells]
+            rows.append([name, *shown, "" if unit == "1" else unit])
+        found = start_values.notes(scene, variant)
+        print_table(f"Start values of BarrierSliding: {scene.title}", ["", *start_values.WAYS, "unit"], rows, found)
 
 
 @app.command(epilog="Example: python -m fmu benchmark --spacing 0.4")
@@ -162,7 +234,7 @@ def benchmark(
         try:
             closed_form = [
                 archive.build_python_unit(units["BarrierSliding"], folder),
-                c_unit.build_c_unit(folder, platforms=(c_unit.host_platform(),)),
+                c_unit.build_c_unit(c_unit.C_UNITS[0], folder, platforms=(c_unit.host_platform(),)),
             ]
             simulator = archive.build_python_unit(units["DebrisFlow"], folder, scenario=scenario)
             costs = closed_form_costs(closed_form)
@@ -176,6 +248,33 @@ def benchmark(
             value = f"{1e6 * cost.value:.2g} µs"
         rows.append([cost.what, value])
     print_table("Cost of the units, wall time", ["", "measured"], rows)
+
+
+def _build(
+    names: list[str], out: Path, scenario: Path | None, platforms: tuple[str, ...] | None, *, by_name: bool
+) -> None:
+    from fmu import archive, c_unit
+
+    simulated = None
+    c_units = [unit for unit in c_unit.C_UNITS if unit.name in names]
+    if platforms:  # what cannot be built is said before anything is
+        if not by_name:
+            c_units = [unit for unit in c_units if any(c_unit.offered(unit, one) for one in platforms)] or c_units
+        for unit in c_units:
+            c_unit.check_platforms(unit, platforms)
+    # Units in C first: they are the ones that may lack what they need.
+    for unit in sorted(c_units, key=lambda unit: unit.base == "DebrisFlow"):
+        if unit.base == "DebrisFlow" and simulated is None:
+            simulated = archive.simulated_reference(scenario)
+        built = c_unit.build_c_unit(unit, out, platforms=platforms, scenario=scenario, simulated=simulated)
+        _tell(built, f"for {', '.join(c_unit.platforms_of(built))}")
+    if c_units and platforms is None and not c_unit.has_cross_compiler():
+        typer.echo(c_unit.needs_cross_compiler("Building the units in C for other platforms"), err=True)
+    for packed in archive.PYTHON_UNITS:
+        if packed.name in names:
+            if packed.name == "DebrisFlow" and simulated is None:
+                simulated = archive.simulated_reference(scenario)
+            _tell(archive.build_python_unit(packed, out, scenario=scenario, simulated=simulated))
 
 
 def _prove(file: Path, content: list[object], as_json: bool) -> bool:
@@ -262,13 +361,20 @@ def _comparison(found: CrossCheck) -> tuple[str, list[str], list[list[str]], lis
         rows.append([f"unit, {comparison.name}", *cells])
     fits = [c.parameters for c in found.comparisons if c.name == "calibrated"]
     notes = [
-        f"Calibrated: s1max = {p['s1max']:.4g} m (λ = {p['s1max'] / p['flow_length']:.3g}), τ = {p['rise_ratio']:.3g}."
+        f"Calibrated on this run: s1max = {p['s1max']:.4g} m (λ = {p['s1max'] / p['flow_length']:.3g}), "
+        f"τ = {p['rise_ratio']:.3g}."
         for p in fits
     ]
     notes += [
-        f"With vertical load: κ = {c.parameters['vertical_load_ratio']:.3g}."
+        f"{c.name.capitalize()}: κ = {c.parameters['vertical_load_ratio']:.3g}."
         for c in found.comparisons
-        if "vertical_load_ratio" in c.parameters
+        if c.name == "with vertical load"
+    ]
+    notes += [
+        f"Variant calibrated, fitted to other simulations: λ = {c.parameters['geometry_change']:.3g}, "
+        f"τ = {c.parameters['rise_ratio']:.3g}, κ = {c.parameters['vertical_load_ratio']:.3g}."
+        for c in found.comparisons
+        if c.name == "variant calibrated"
     ]
     notes += [
         f"Simulated force: {found.filter_rule}. rms: over the largest simulated value.",

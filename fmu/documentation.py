@@ -33,7 +33,7 @@ def entries(interface: Interface, version: str, *, packer: str = "pythonfmu") ->
 
 def page(interface: Interface, version: str) -> str:
     """The documentation page: what the unit is, its equations and limits, and its table of variables."""
-    body = (_ASSETS / f"{_asset_name(interface)}.html").read_text(encoding="utf-8")
+    body = (_ASSETS / f"{reference.base_of(interface.name)}.html").read_text(encoding="utf-8")
     tables = "".join(
         _table(heading, interface.of(causality))
         for heading, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
@@ -44,10 +44,6 @@ def page(interface: Interface, version: str) -> str:
         f"<style>{_STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n<p>{html.escape(interface.description)}.</p>\n"
         f"{body}\n{tables}</body></html>\n"
     )
-
-
-def _asset_name(interface: Interface) -> str:
-    return {"BarrierSlidingC": "BarrierSliding"}.get(interface.name, interface.name)
 
 
 def _table(heading: str, variables: tuple[Variable, ...]) -> str:

@@ -6,12 +6,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analytic.force_record import FILTER_WINDOW, moving_mean
-from analytic.plots import BLUE, GREEN, GREY, ORANGE, SKY
+from analytic.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 from fmu.cross_check import Array, CrossCheck, Trajectory
 
 _STYLES = {
     "paper": (ORANGE, "--", "unit, the paper's λ"),
-    "calibrated": (BLUE, "-", "unit, calibrated"),
+    "variant calibrated": (PURPLE, (0, (4, 1, 1, 1, 1, 1)), "unit, the variant calibrated"),
+    "calibrated": (BLUE, "-", "unit, calibrated on this run"),
     "with vertical load": (GREEN, "-.", "unit, calibrated, with the flow's weight"),
     "simulated force": (SKY, ":", "unit, driven by the simulated force"),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -18,10 +19,12 @@ class Unit:
         name, set at each initialization, those that the unit has."""
         from fmpy import read_model_description
         from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
 
         description = read_model_description(str(path))
         self.variables = {v.name: v for v in description.modelVariables}
-        self.fmu = FMU2Slave(
+        self.fmi3 = description.fmiVersion.startswith("3")
+        self.fmu = (FMU3Slave if self.fmi3 else FMU2Slave)(
             guid=description.guid,
             unzipDirectory=str(unzipped),
             modelIdentifier=description.coSimulation.modelIdentifier,
@@ -31,13 +34,15 @@ class Unit:
         self.time = 0.0
         self._settings = {name: value for name, value in (settings or {}).items() if name in self.variables}
 
-    def initialize(self, start_time: float = 0.0, **values: Any) -> Self:
+    def initialize(self, start_time: float = 0.0, stop_time: float | None = None, **values: Any) -> Self:
         """Set the settings and parameters, and initialize at the time [s]."""
-        self.fmu.setupExperiment(startTime=start_time)
+        times = {"startTime": start_time, "stopTime": stop_time}
+        if not self.fmi3:
+            self.fmu.setupExperiment(**times)
         self.time = start_time
         for name, value in (self._settings | values).items():
             self[name] = value
-        self.fmu.enterInitializationMode()
+        self.fmu.enterInitializationMode(**(times if self.fmi3 else {}))
         self.fmu.exitInitializationMode()
         return self
 
@@ -58,11 +63,34 @@ class Unit:
         self._access(name, "set")([self.variables[name].valueReference], [value])
 
     def _access(self, name: str, verb: str) -> Any:
-        return getattr(self.fmu, verb + self.variables[name].type)
+        kind = self.variables[name].type
+        return getattr(self.fmu, verb + ("Int64" if kind == "Enumeration" else kind))
 
     def reals(self, names: Sequence[str]) -> list[float]:
         """Values of variables that are numbers, in one call."""
-        return list(self.fmu.getReal([self.variables[name].valueReference for name in names]))
+        references = [self.variables[name].valueReference for name in names]
+        return list(self.fmu.getFloat64(references) if self.fmi3 else self.fmu.getReal(references))
+
+    def save(self) -> Any:
+        """The unit's state, for ``restore``."""
+        return self.fmu.getFMUState() if self.fmi3 else self.fmu.getFMUstate()
+
+    def restore(self, state: Any, time: float) -> None:
+        """Go back to a state and its time [s]."""
+        (self.fmu.setFMUState if self.fmi3 else self.fmu.setFMUstate)(state)
+        self.time = time
+
+    def release(self, state: Any) -> None:
+        """Give a state back."""
+        (self.fmu.freeFMUState if self.fmi3 else self.fmu.freeFMUstate)(state)
+
+    def serialized(self, state: Any) -> bytes:
+        """A state as bytes."""
+        return (self.fmu.serializeFMUState if self.fmi3 else self.fmu.serializeFMUstate)(state)
+
+    def deserialized(self, data: bytes) -> Any:
+        """A state from its bytes."""
+        return (self.fmu.deserializeFMUState if self.fmi3 else self.fmu.deSerializeFMUstate)(data)
 
     def outputs(self) -> dict[str, Any]:
         """All outputs by name."""
@@ -74,13 +102,23 @@ class Unit:
             [
                 name
                 for name, v in self.variables.items()
-                if v.causality == "output" and v.type == "Real" and name != "time_ratio"
+                if v.causality == "output" and v.type in ("Real", "Float64") and name != "time_ratio"
             ]
         )
 
     def free(self) -> None:
         """Give the instance back; its library stays loaded."""
-        self.fmu.fmi2FreeInstance(self.fmu.component)
+        (self.fmu.fmi3FreeInstance if self.fmi3 else self.fmu.fmi2FreeInstance)(self.fmu.component)
+
+
+@contextlib.contextmanager
+def instance_of(path: Path) -> Iterator[Unit]:
+    """An instance of the archive, unpacked into a folder of its own; instance and folder are gone at the end."""
+    with (
+        tempfile.TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True) as folder,
+        instance(path, Path(folder)) as unit,
+    ):
+        yield unit
 
 
 @contextlib.contextmanager

@@ -1,12 +1,15 @@
 """Reference results that ship inside the archives, in the layout of the FMI cross-check rules.
 
 ``{unit}_in.csv`` holds the inputs over time, ``{unit}_ref.csv`` the outputs at every communication point and
-``{unit}_ref.opt`` the settings of the run. Names are quoted as in the XML, time comes first.
+``{unit}_ref.opt`` the settings of the run. Names are quoted as in the XML, time comes first. A unit that can be driven
+in another way has more of them, ``{unit}_{way}_in.csv`` and so on, and with them ``{unit}_{way}_start.csv``, the start
+values that differ.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from fmu.units import barrier_sliding, debris_flow, ground_anchor
@@ -30,10 +33,32 @@ def anchor_inputs(time: float) -> dict[str, float]:
     return {"barrier_displacement": time / 2 if time <= 2.0 else 1.5 - time / 4}
 
 
-_CASES: dict[str, tuple[type[UnitSlave], InputHistory]] = {
-    "BarrierSliding": (barrier_sliding.BarrierSlidingSlave, barrier_inputs),
-    "BarrierSlidingC": (barrier_sliding.BarrierSlidingSlave, barrier_inputs),
-    "GroundAnchor": (ground_anchor.GroundAnchorSlave, anchor_inputs),
+def pushed_inputs(time: float) -> dict[str, float]:
+    """A force from outside that rises to 500 kN/m in 0.5 s, stays for 1 s and falls to a thrust of 80 kN/m; the flow
+    weighs half of it. From 2 s on something pulls the barrier back."""
+    force = 1e6 * min(time, 0.5) if time <= 1.5 else max(80e3, 500e3 - 1e6 * (time - 1.5))
+    return {
+        "external_force": -300e3 if time >= 2.0 else 0.0,
+        "vertical_load": force / 2,
+        "impact_force_input": force,
+    }
+
+
+@dataclass(frozen=True)
+class Case:
+    """One way to drive a unit."""
+
+    slave: type[UnitSlave]
+    inputs: InputHistory
+    start: Mapping[str, float] = field(default_factory=dict)
+
+
+_CASES: dict[str, dict[str, Case]] = {
+    "BarrierSliding": {
+        "": Case(barrier_sliding.BarrierSlidingSlave, barrier_inputs),
+        "force_input": Case(barrier_sliding.BarrierSlidingSlave, pushed_inputs, {"impact_force_source": 2}),
+    },
+    "GroundAnchor": {"": Case(ground_anchor.GroundAnchorSlave, anchor_inputs)},
 }
 
 
@@ -41,13 +66,23 @@ SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE = 1.0, 0.05, 0.01
 """End and communication step [s] of the simulator's reference run, and how near another machine must come to it."""
 
 
+def base_of(name: str) -> str:
+    """Name of the Python unit that a unit is the twin of: without what stands for C and the version of the standard."""
+    return name.removesuffix("3").removesuffix("C")
+
+
 def files(interface: Interface) -> dict[str, bytes]:
     """The reference files of a unit by name; none for the simulator's, see ``simulated_files``."""
-    if interface.name not in _CASES:
-        return {}
-    slave_class, inputs = _CASES[interface.name]
-    slave = slave_class(instance_name="reference", resources="")
-    return _run(slave, interface, inputs, interface.stop_time, interface.step_size, 1e-9)
+    found: dict[str, bytes] = {}
+    for way, case in _CASES.get(base_of(interface.name), {}).items():
+        slave = case.slave(instance_name="reference", resources="")
+        for name, value in case.start.items():
+            slave[name] = value
+        name = f"{interface.name}_{way}" if way else interface.name
+        found |= _run(slave, interface, name, case.inputs, interface.stop_time, interface.step_size, 1e-9)
+        if case.start:
+            found[f"{name}_start.csv"] = (_header(list(case.start)) + _row(*case.start.values())).encode()
+    return found
 
 
 def simulated_files(resources: Path) -> dict[str, bytes]:
@@ -60,15 +95,21 @@ def simulated_files(resources: Path) -> dict[str, bytes]:
     slave = debris_flow.DebrisFlowSlave(instance_name="reference", resources=str(resources))
     still = {v.name: 0.0 for v in debris_flow.INTERFACE.of("input")}
     try:
-        return _run(
-            slave, debris_flow.INTERFACE, lambda time: still, SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE
-        )
+        interface = debris_flow.INTERFACE
+        times = (SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE)
+        return _run(slave, interface, interface.name, lambda time: still, *times)
     finally:
         slave.close()
 
 
 def _run(
-    slave: UnitSlave, interface: Interface, inputs: InputHistory, end: float, step: float, tolerance: float
+    slave: UnitSlave,
+    interface: Interface,
+    name: str,
+    inputs: InputHistory,
+    end: float,
+    step: float,
+    tolerance: float,
 ) -> dict[str, bytes]:
     # The simulator's speed is its machine's, and a text has no place in a table of numbers.
     names = [v.name for v in interface.of("output") if v.name != "time_ratio" and v.kind != "String"]
@@ -90,9 +131,9 @@ def _run(
             raise UnitError(f"The reference run of {interface.name} failed at {time:g} s.")
     options = {"StartTime": 0.0, "StopTime": end, "StepSize": step, "RelTol": tolerance}
     return {
-        f"{interface.name}_in.csv": "".join(input_lines).encode(),
-        f"{interface.name}_ref.csv": "".join(output_lines).encode(),
-        f"{interface.name}_ref.opt": "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode(),
+        f"{name}_in.csv": "".join(input_lines).encode(),
+        f"{name}_ref.csv": "".join(output_lines).encode(),
+        f"{name}_ref.opt": "".join(f"{key}, {value!r}\n" for key, value in options.items()).encode(),
     }
 
 

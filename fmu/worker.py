@@ -54,7 +54,7 @@ class Worker:
         return {}
 
     def step(
-        self, *, until: float, barrier_velocity: float | None, external_force: float, overtopped: bool
+        self, *, until: float, barrier_velocity: float | None, external_force: float, gauge: float | None
     ) -> dict[str, Any]:
         if barrier_velocity is not None and barrier_velocity != self.barrier_velocity:
             self.simulation.set_barrier_velocity(barrier_velocity)
@@ -68,7 +68,7 @@ class Worker:
             self.external_force = external_force
         if until > self.simulation.time:
             self.simulation.advance(until=until)
-        return self.sample() | (self.overtopped_volume() if overtopped else {})
+        return self.sample() | ({} if gauge is None else self.count(gauge=gauge))
 
     def sample(self) -> dict[str, Any]:
         from warp_mpm.quantities.time_series import NAMED
@@ -84,13 +84,16 @@ class Worker:
             "vertical_load": 0.0 - sum(values.get(f"{surface}_y", 0.0) for surface in surfaces),
         }
 
-    def overtopped_volume(self) -> dict[str, Any]:
+    def count(self, *, gauge: float) -> dict[str, Any]:
+        """What takes all material points: volume beyond the crest, and depth at the gauge, a place along x [m]."""
         from warp_mpm.mechanism import deposit
 
         volume = 0.0
         if self.scenario.barrier is not None:
             volume = deposit(self.scenario, _Present(self.simulation))["overtopped_volume"] or 0.0  # type: ignore[arg-type]
-        return {"overtopped_volume": volume}
+        reach, points = self.scenario.numerics.spacing_m, self.simulation.points(("position", "volume"))
+        near = abs(points["position"][:, 0] - gauge) <= reach
+        return {"overtopped_volume": volume, "gauge_depth": float(points["volume"][near].sum()) / (2.0 * reach)}
 
     def save_state(self) -> dict[str, Any]:
         self.last_key += 1

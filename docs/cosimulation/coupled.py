@@ -5,16 +5,14 @@
 
 DebrisFlow gives the force on the barrier, BarrierSliding moves the barrier under it and gives its velocity back, and
 GroundAnchor holds the barrier by a force that follows from its displacement. The barrier's mass, base friction and
-slope, and the end of the run, are those of the scenario in DebrisFlow.fmu. Run with --help for the options.
+slope, and the end of the run, are those of the scenario in DebrisFlowC.fmu. Run with --help for the options.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import shutil
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +22,9 @@ from typing import NoReturn
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from warp_mpm import Scenario
+from fmu.system import barrier_parameters, scenario_in
 
-UNITS = ("DebrisFlow", "BarrierSliding", "GroundAnchor")
+UNITS = ("DebrisFlowC", "BarrierSlidingC", "GroundAnchorC")
 
 
 class Unit:
@@ -79,33 +77,6 @@ class Row:
     """Since the first step began [s]."""
 
 
-def scenario_in(archives: Path) -> Scenario:
-    """The scenario that DebrisFlow simulates."""
-    with zipfile.ZipFile(archives / "DebrisFlow.fmu") as archive:
-        return Scenario.model_validate(json.loads(archive.read("resources/scenario.json")))
-
-
-def barrier_parameters(scenario: Scenario, barrier_mass: float | None = None) -> dict[str, float]:
-    """What BarrierSliding must be given to be the scenario's barrier, or one of another mass [kg/m].
-
-    Raises:
-        ValueError: the scenario's barrier is none that BarrierSliding could be.
-    """
-    motion = scenario.barrier.motion if scenario.barrier is not None else None
-    if scenario.barrier is None or motion is None or motion.kind != "sliding":
-        kind = f"barrier.motion.kind is {motion.kind!r}" if motion is not None else "there is no barrier"
-        raise ValueError(f"{scenario.title}: {kind}, it must be 'sliding' for a barrier that another unit moves.")
-    friction, gravity, slope = motion.base_friction_coefficient, scenario.gravity, scenario.gravity.tilt_deg
-    if slope and friction <= abs(math.tan(math.radians(slope))):
-        raise ValueError(
-            f"{scenario.title}: the barrier's base friction is {friction:.3g}, it must be greater than the slope's "
-            f"tangent, {abs(math.tan(math.radians(slope))):.3g}: BarrierSliding knows no barrier that slides by itself."
-        )
-    mass = barrier_mass if barrier_mass is not None else scenario.barrier.mass
-    acceleration = gravity.acceleration_m_per_s2
-    return {"barrier_mass": mass, "base_friction": friction, "gravity": acceleration, "slope": slope}
-
-
 def run_coupled(
     archives: Path,
     *,
@@ -122,12 +93,12 @@ def run_coupled(
     time, so that the barrier receives just the momentum that the flow lost. ``jacobi`` steps all units with what the
     others gave at the last communication point, as tools do that step them side by side.
     """
-    scenario = scenario_in(archives)
+    scenario = scenario_in(archives / "DebrisFlowC.fmu")
     parameters = barrier_parameters(scenario, barrier_mass)
     end = scenario.output.end_time_s if end is None else end
-    flow = Unit(archives / "DebrisFlow.fmu", barrier_motion=2, spacing=spacing)
-    barrier = Unit(archives / "BarrierSliding.fmu", impact_force_source=2, **parameters)
-    tie = Unit(archives / "GroundAnchor.fmu", **(anchor or {"slack": 1e3}))
+    flow = Unit(archives / "DebrisFlowC.fmu", barrier_motion=2, spacing=spacing)
+    barrier = Unit(archives / "BarrierSlidingC.fmu", impact_force_source=2, **parameters)
+    tie = Unit(archives / "GroundAnchorC.fmu", **(anchor or {"slack": 1e3}))
     rows = [Row(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
     started = perf_counter()
     try:
@@ -206,7 +177,7 @@ def main() -> None:
     given = parser.parse_args()
     if not all((given.archives / f"{name}.fmu").is_file() for name in UNITS):
         parser.error(f"--archives: {given.archives} must hold {', '.join(UNITS)}; python -m fmu build makes them")
-    scenario = scenario_in(given.archives)
+    scenario = scenario_in(given.archives / "DebrisFlowC.fmu")
     end = scenario.output.end_time_s if given.end is None else given.end
     if given.step > end:
         parser.error(f"--step: {given.step:g} is not allowed; it must be at most --end, {end:g}")

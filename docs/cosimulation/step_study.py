@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from coupled import run_coupled, scenario_in
+from coupled import run_coupled
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from fmu.system import scenario_in
 from warp_mpm import Scenario, Simulation
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "set_iib.json"
@@ -131,7 +132,7 @@ def main() -> None:
     parser.add_argument("--spacing", type=float, default=0.4, help="grid spacing [m]")
     parser.add_argument("--figure", type=Path, default=Path("build/step_study.png"), help="picture to write")
     given = parser.parse_args()
-    if scenario_in(given.archives) != Scenario.load(SCENARIO):
+    if scenario_in(given.archives / "DebrisFlowC.fmu") != Scenario.load(SCENARIO):
         parser.error(f"--archives: DebrisFlow.fmu in {given.archives} must hold Set IIb")
     outcomes, references = study(given.archives, given.spacing)
     for mass, (displacement, wall) in references.items():

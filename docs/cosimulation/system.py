@@ -3,7 +3,7 @@
     python -m fmu build
     python docs/cosimulation/system.py --out build/system.ssp --run
 
-The barrier's mass, base friction and slope, and the end of the run, are those of the scenario in DebrisFlow.fmu, as in
+The barrier's mass, base friction and slope, and the end of the run, are those of the scenario in DebrisFlowC.fmu, as in
 coupled.py. Any tool that reads SSP takes the archive, for instance libcosim or OMSimulator; they apply the parameters
 in it. fmpy's own runner leaves them to its caller, so they are read here and passed on.
 """
@@ -11,48 +11,21 @@ in it. fmpy's own runner leaves them to its caller, so they are read here and pa
 from __future__ import annotations
 
 import argparse
-import re
-import zipfile
 from pathlib import Path
-from xml.etree import ElementTree
 
-from coupled import barrier_parameters, scenario_in
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import Parameter, ParameterSet
 
-STRUCTURE = Path(__file__).with_name("SystemStructure.ssd")
-UNITS = ("DebrisFlow", "BarrierSliding", "GroundAnchor")
-NAMESPACES = {
-    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
-}
+from fmu.system import COMPONENTS, parameters_in, scenario_in, write_system
 
-
-def write_system(archives: Path, path: Path, *, spacing: float | None = None) -> Path:
-    """Pack the structure and the units into ``path``; ``spacing`` [m] replaces that of the scenario."""
-    scenario = scenario_in(archives)
-    values = barrier_parameters(scenario) | ({} if spacing is None else {"spacing": spacing})
-    structure = STRUCTURE.read_text(encoding="utf-8")
-    for name, value in values.items():
-        structure = re.sub(rf'(name="{name}"><ssv:Real value=)"[^"]*"', rf'\g<1>"{value!r}"', structure)
-    structure = re.sub(r'stopTime="[^"]*"', f'stopTime="{scenario.output.end_time_s!r}"', structure)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("SystemStructure.ssd", structure)
-        for unit in UNITS:
-            archive.write(archives / f"{unit}.fmu", f"resources/{unit}.fmu")
-    return path
+UNITS = tuple(unit for unit, _ in COMPONENTS.values())
 
 
 def parameters(path: Path) -> ParameterSet:
     """The parameters in an SSP archive, in the form that fmpy's runner takes."""
-    with zipfile.ZipFile(path) as archive:
-        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
     found = ParameterSet(name="all")
-    for component in root.iterfind(".//ssd:Component", NAMESPACES):
-        for parameter in component.iterfind(".//ssv:Parameter", NAMESPACES):
-            name, value = f"{component.get('name')}.{parameter.get('name')}", parameter[0].get("value")
-            found.parameters.append(Parameter(name=name, type=parameter[0].tag.split("}")[1], value=value))
+    for name, (kind, value) in parameters_in(path).items():
+        found.parameters.append(Parameter(name=name, type=kind, value=value))
     return found
 
 
@@ -75,7 +48,7 @@ def main() -> None:
         parser.error(f"--out: {given.out} cannot be written: {error.strerror}")
     print(f"System: {path}")
     if given.run:
-        end = scenario_in(given.archives).output.end_time_s if given.end is None else given.end
+        end = given.end or scenario_in(given.archives / f"{UNITS[0]}.fmu").output.end_time_s
         result = simulate_ssp(str(path), stop_time=end, step_size=given.step, parameter_set=parameters(path))
         last = result[-1]
         print(f"Final displacement: {last['barrier.barrier_displacement']:.3f} m")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from analytic.impact import PHASES, STANDARD_GRAVITY, VARIANTS, Impact
@@ -116,7 +116,7 @@ VARIABLES = (
         unit=METRE_PER_SECOND,
         minimum=0.0,
     ),
-    _parameter("base_friction", "Friction tan(delta_b) of the barrier on its base", 0.29, minimum=0.0),
+    _parameter("base_friction", "Friction tan(delta_b) of the barrier on its base", 0.29, minimum=0.0, tunable=True),
     _parameter(
         "geometry_change",
         "Geometry change lambda = s1max / L of the flow; unused where s1max is given",
@@ -142,7 +142,8 @@ VARIABLES = (
     ),
     _parameter(
         "vertical_load_ratio",
-        "Vertical load kappa of the flow on the barrier over its horizontal force; the paper's model leaves it out",
+        "Vertical load kappa of the flow on the barrier over its horizontal force, wherever that comes from; the "
+        "paper's model leaves it out",
         0.0,
         minimum=0.0,
     ),
@@ -221,9 +222,23 @@ INTERFACE = Interface(
 )
 
 
+def check_friction(base_friction: float, slope: float, vertical_load_ratio: float) -> None:
+    """What ``Impact`` demands of a base friction, for one that is changed between steps."""
+    steepest = abs(math.tan(math.radians(slope)))
+    if steepest > 0 and base_friction <= steepest:
+        raise UnitError(
+            f"base_friction is {base_friction:g}, on a slope of {slope:g} degrees it must be above {steepest:.4g}, "
+            "else the barrier slides by its own weight."
+        )
+    if vertical_load_ratio * base_friction >= 1:
+        raise UnitError(f"vertical_load_ratio is {vertical_load_ratio:g}, it must be in [0, {1 / base_friction:g}).")
+
+
 @dataclass
 class Loads:
-    """What a system brings onto the barrier [N/m], constant over a step."""
+    """What a system brings onto the barrier [N/m], constant over a step, and the friction of its base."""
+
+    base_friction: float
 
     external_force: float = 0.0
     vertical_load: float = 0.0
@@ -250,8 +265,11 @@ class SlidingBarrier:
     peak_force: float = 0.0
     force: float = 0.0
     phase: str = PHASES[0]
+    base_friction: float = field(init=False)
+    """tan(delta_b) as last set: the importer may change it between steps."""
 
     def __post_init__(self) -> None:
+        self.base_friction = self.impact.base_friction or 0.0
         if self.force_is_input:
             self.velocity, self.integrated = self.impact.barrier_initial_velocity, True
         else:
@@ -265,22 +283,26 @@ class SlidingBarrier:
 
     def advance(self, end: float, loads: Loads) -> None:
         """Go on to the time ``end`` [s] under the loads."""
-        acted = loads.external_force or loads.vertical_load
-        if acted and self.impact.variant == "as_printed":
+        impact = self.impact
+        tuned = not impact.fixed and loads.base_friction != self.base_friction
+        acted = loads.external_force or loads.vertical_load or tuned
+        if acted and impact.variant == "as_printed":
+            fault = "base_friction must stay as it was" if tuned else "external_force and vertical_load must be 0"
             raise UnitError(
-                "variant is 3 (as_printed), which is a set of functions of time: external_force and vertical_load "
-                "must be 0, or choose 1 (stick_slip)."
+                f"variant is 3 (as_printed), which is a set of functions of time: {fault}, or choose 1 (stick_slip)."
             )
+        if tuned:
+            check_friction(loads.base_friction, impact.slope, impact.vertical_load_ratio)
+            self.base_friction = loads.base_friction
         if not self.integrated and not acted:
             self._follow_closed_form(end)
             return
         self.integrated = True
-        impact = self.impact
-        tangent, angle = impact.base_friction or 0.0, math.radians(impact.slope)
+        tangent, angle = self.base_friction, math.radians(impact.slope)
         weight = (impact.barrier_mass or 0.0) * impact.gravity
         pressing = max(weight * math.cos(angle) + loads.vertical_load, 0.0)
         pushing = loads.external_force + weight * math.sin(angle)
-        share = 0.0 if self.force_is_input else impact.vertical_load_ratio
+        share = impact.vertical_load_ratio
         for duration, force, rate in () if impact.fixed else self._force_pieces(end, loads):
             self.displacement, self.velocity = slide(
                 self.displacement,
@@ -288,7 +310,7 @@ class SlidingBarrier:
                 duration,
                 force + pushing,
                 rate,
-                tangent * (pressing + share * force),
+                tangent * max(pressing + share * force, 0.0),
                 tangent * share * rate,
                 impact.barrier_mass or math.inf,
             )
@@ -299,7 +321,7 @@ class SlidingBarrier:
         else:
             self.force = impact.force(end)
         self.time = end
-        self.phase = self._phase(self.force + pushing, tangent * (pressing + share * self.force))
+        self.phase = self._phase(self.force + pushing, tangent * max(pressing + share * self.force, 0.0))
 
     def _force_pieces(self, end: float, loads: Loads) -> list[tuple[float, float, float]]:
         """Duration, impact force at the start and its rate of each piece of the step in which it is linear."""
@@ -381,7 +403,7 @@ class BarrierSlidingSlave(UnitSlave):
         self._write_outputs()
 
     def _loads(self) -> Loads:
-        return Loads(self["external_force"], self["vertical_load"], self["impact_force_input"])
+        return Loads(self["base_friction"], self["external_force"], self["vertical_load"], self["impact_force_input"])
 
     def _write_outputs(self) -> None:
         barrier = self.barrier
@@ -397,15 +419,15 @@ class BarrierSlidingSlave(UnitSlave):
         self["impact_phase"] = PHASE.number_of(barrier.phase)
 
     def snapshot(self) -> dict[str, Any]:
+        # The impact is what the parameters make of it, with the base friction as it was at the start.
         state = asdict(self.barrier)
         del state["impact"]
-        return state
+        return {"friction_at_start": self.barrier.impact.base_friction or 0.0, "barrier": state}
 
     def restore(self, snapshot: dict[str, Any]) -> None:
-        # The parameters came back with the values: the impact is what they make it.
-        time, self.time = self.time, snapshot["time"]
         values = list(self.values)
+        self["base_friction"] = snapshot["friction_at_start"]
         self.start()
-        self.values, self.time = values, time
-        for name, value in snapshot.items():
+        self.values = values
+        for name, value in snapshot["barrier"].items():
             setattr(self.barrier, name, value)

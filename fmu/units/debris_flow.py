@@ -25,7 +25,7 @@ from .interface import (
     Unit,
     Variable,
 )
-from .slave import UnitError, UnitSlave
+from .slave import UnitError, UnitSlave, sealed
 from .worker_process import WorkerProcess
 
 SCENARIO = "scenario.json"
@@ -88,6 +88,15 @@ INTERFACE = Interface(
             nominal=100.0,
         ),
         Variable(
+            "gauge_position",
+            "parameter",
+            "Place along x at which gauge_depth is measured; the toe of the barrier is at 0, upstream is below 0",
+            unit=METRE,
+            start=-1.0,
+            minimum=-1e6,
+            maximum=1e6,
+        ),
+        Variable(
             "barrier_velocity_input",
             "input",
             "Velocity of the barrier where barrier_motion is driven, constant over a step",
@@ -116,6 +125,7 @@ INTERFACE = Interface(
         _recorded("pore_pressure_max", 1e5),
         _recorded("flow_kinetic_energy", 1e6, 0.0),
         _output("overtopped_volume", "Volume of the flow beyond the crest per metre", CUBIC_METRE_PER_METRE, 10.0, 0.0),
+        _output("gauge_depth", "Depth of the flow at gauge_position, mean over two grid spacings", METRE, 1.0, 0.0),
         Variable("time_ratio", "output", "Simulated time over wall time since the start", minimum=0.0),
         Variable("message", "output", "What went wrong, in one sentence; empty while all is well", "String"),
     ),
@@ -123,9 +133,12 @@ INTERFACE = Interface(
     step_size=0.01,
 )
 
-_NOT_SAMPLED = ("overtopped_volume", "time_ratio", "message")
+_COUNTED = ("overtopped_volume", "gauge_depth")
+"""Outputs that take all material points: counted for an importer that asks for one, and then within each step."""
+
+_NOT_SAMPLED = (*_COUNTED, "time_ratio", "message")
 _SAMPLED = tuple(v.name for v in INTERFACE.of("output") if v.name not in _NOT_SAMPLED)
-_OVERTOPPED = INTERFACE.references["overtopped_volume"]
+_COUNTED_REFERENCES = frozenset(INTERFACE.references[name] for name in _COUNTED)
 
 
 class WorkerState:
@@ -161,7 +174,7 @@ class DebrisFlowSlave(UnitSlave):
         self.states: weakref.WeakSet[WorkerState] = weakref.WeakSet()
         self.start_time = 0.0
         self.wall_time = 0.0
-        self.overtopped_due = self.overtopped_wanted = False
+        self.counts_due = self.counts_wanted = False
 
     def start(self) -> None:
         self.start_time, self.wall_time = self.time, 0.0
@@ -175,7 +188,7 @@ class DebrisFlowSlave(UnitSlave):
             "spacing": self["spacing"] or None,
             "driven": BARRIER_MOTION.name_of(self["barrier_motion"]) == "driven",
         }
-        if self.worker is None or settings != self.opened:
+        if self.worker is None or not self.worker.alive or settings != self.opened:
             self.close()
             self.worker = WorkerProcess(str(self.resources))
             try:
@@ -201,7 +214,7 @@ class DebrisFlowSlave(UnitSlave):
             until=end - self.start_time,
             barrier_velocity=self["barrier_velocity_input"] if self.opened["driven"] else None,
             external_force=self["external_force"],
-            overtopped=self.overtopped_wanted,
+            gauge=self["gauge_position"] if self.counts_wanted else None,
         )
         self.wall_time += time.perf_counter() - started
         self["time_ratio"] = (end - self.start_time) / self.wall_time
@@ -213,25 +226,26 @@ class DebrisFlowSlave(UnitSlave):
         if self.wall_time == 0.0:
             self["time_ratio"] = 0.0
         self["message"] = ""
-        self.overtopped_due = "overtopped_volume" not in answer
-        if not self.overtopped_due:
-            self["overtopped_volume"] = answer["overtopped_volume"]
+        self.counts_due = _COUNTED[0] not in answer
+        for name in _COUNTED:
+            self[name] = answer.get(name, 0.0)  # until it is asked for
 
     def _get(self, kind: str, references: Sequence[int]) -> list[Any]:
-        # It takes all material points, which the other outputs do not: counted only for an importer that asks, and from
-        # then on within each step.
-        if self.overtopped_due and self.worker is not None and kind == "Real" and _OVERTOPPED in references:
-            self.overtopped_due, self.overtopped_wanted = False, True
+        due = self.counts_due and self.worker is not None
+        if due and kind == "Real" and not _COUNTED_REFERENCES.isdisjoint(references):
+            self.counts_due, self.counts_wanted = False, True
+            assert self.worker is not None
             try:
-                answer = self.worker.ask("overtopped_volume", self["reply_time_limit"])
-                self["overtopped_volume"] = answer["overtopped_volume"]
+                answer = self.worker.ask("count", self["reply_time_limit"], gauge=self["gauge_position"])
+                for name in _COUNTED:
+                    self[name] = answer[name]
             except UnitError as error:
                 self.fail(str(error))
         return super()._get(kind, references)
 
     def fail(self, message: str) -> None:
         super().fail(message)
-        self.overtopped_due = False
+        self.counts_due = False
 
     def close(self) -> None:
         worker, self.worker = getattr(self, "worker", None), None
@@ -255,7 +269,7 @@ class DebrisFlowSlave(UnitSlave):
         state, limit = snapshot["worker_state"], self["reply_time_limit"]
         self.start_time, self.wall_time = snapshot["start_time"], snapshot["wall_time"]
         worker = self._open()
-        self.overtopped_due = True
+        self.counts_due = True
         if isinstance(state, WorkerState) and state.worker is worker:
             worker.ask("restore_state", limit, key=state.key)
         else:
@@ -263,7 +277,10 @@ class DebrisFlowSlave(UnitSlave):
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        snapshot = state["snapshot"]
-        if snapshot is not None:
-            snapshot = {**snapshot, "worker_state": snapshot["worker_state"].data()}
-        return json.dumps({**state, "snapshot": snapshot}).encode()
+        snapshot = state.get("snapshot")
+        try:
+            if snapshot is not None and isinstance(snapshot["worker_state"], WorkerState):
+                snapshot = {**snapshot, "worker_state": snapshot["worker_state"].data()}
+            return sealed(json.dumps({**state, "snapshot": snapshot}).encode())
+        except UnitError as error:  # no exception may go to the wrapper from here, see ``_fmu_state_from_bytes``
+            return sealed(json.dumps({"fault": f"The state could not be serialized: {error}"}).encode())

@@ -23,6 +23,7 @@ INTERFACE = Interface(
             minimum=0.0,
             open_minimum=True,
             nominal=1e5,
+            tunable=True,
         ),
         Variable(
             "slack",
@@ -41,6 +42,7 @@ INTERFACE = Interface(
             minimum=0.0,
             open_minimum=True,
             nominal=1e5,
+            tunable=True,
         ),
         Variable(
             "barrier_displacement",

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 
 Value = float | int | bool | str
+
+SMALLEST_ABOVE_NIL = sys.float_info.min
+"""The standard's ``min`` includes its number, so a range that begins above nil is told with this one."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,8 @@ class Variable:
 
     ``kind`` is ``Real``, ``Integer`` (a choice), ``Boolean`` or ``String``; ``causality`` is ``parameter``, ``input``
     or ``output``. ``start`` is given for parameters and inputs alone: outputs are calculated. ``minimum`` and
-    ``maximum`` bound the value; with ``open_minimum`` the minimum itself is refused.
+    ``maximum`` bound the value; with ``open_minimum`` the minimum itself is refused. A ``tunable`` parameter may be
+    changed between steps and acts from the next one on.
     """
 
     name: str
@@ -80,12 +85,18 @@ class Variable:
     open_minimum: bool = False
     nominal: float = 1.0
     choice: Choice | None = None
+    tunable: bool = False
 
     @property
     def variability(self) -> str:
         if self.causality == "parameter":
-            return "fixed"
+            return "tunable" if self.tunable else "fixed"
         return "continuous" if self.kind == "Real" else "discrete"
+
+    @property
+    def least(self) -> float | None:
+        """The least number that is allowed, as an importer reads it: above nil where nil is refused."""
+        return SMALLEST_ABOVE_NIL if self.open_minimum and self.minimum == 0 else self.minimum
 
     @property
     def range_text(self) -> str:
@@ -126,6 +137,8 @@ class Interface:
     variables: tuple[Variable, ...]
     stop_time: float
     step_size: float
+    output_derivatives: int = 0
+    """Highest order of the derivatives of its outputs that the unit gives."""
     references: dict[str, int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -137,3 +150,8 @@ class Interface:
     def of(self, causality: str) -> tuple[Variable, ...]:
         """The variables of one causality, in order."""
         return tuple(variable for variable in self.variables if variable.causality == causality)
+
+    @property
+    def settable_in_steps(self) -> tuple[Variable, ...]:
+        """What an importer may set between steps: inputs and tunable parameters."""
+        return tuple(variable for variable in self.variables if variable.causality == "input" or variable.tunable)

@@ -62,10 +62,10 @@ def model_description(
         "CoSimulation",
         {
             "modelIdentifier": interface.name,
-            "needsExecutionTool": _boolean(needs_execution_tool),
+            "needsExecutionTool": boolean(needs_execution_tool),
             "canHandleVariableCommunicationStepSize": "true",
             "canInterpolateInputs": "false",
-            "maxOutputDerivativeOrder": "0",
+            "maxOutputDerivativeOrder": str(interface.output_derivatives),
             "canRunAsynchronuously": "false",
             "canBeInstantiatedOnlyOncePerProcess": "false",
             "canNotUseMemoryManagementFunctions": "true",
@@ -78,14 +78,14 @@ def model_description(
         files = SubElement(co_simulation, "SourceFiles")
         for name in source_files:
             SubElement(files, "File", {"name": name})
-    _unit_definitions(root, interface)
+    unit_definitions(root, interface)
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         SubElement(categories, "Category", {"name": name, "description": description})
     SubElement(
         root,
         "DefaultExperiment",
-        {"startTime": "0", "stopTime": _number(interface.stop_time), "stepSize": _number(interface.step_size)},
+        {"startTime": "0", "stopTime": number(interface.stop_time), "stepSize": number(interface.step_size)},
     )
     variables = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(interface.variables):
@@ -99,17 +99,42 @@ def full_description(variable: Variable) -> str:
     return f"{variable.description}: {variable.range_text}" if variable.choice else variable.description
 
 
-def _unit_definitions(root: Element, interface: Interface) -> None:
+def unit_definitions(root: Element, interface: Interface, *others: Unit) -> None:
+    """Append the units of the variables, and others."""
     units: dict[str, Unit] = {v.unit.name: v.unit for v in interface.variables if v.kind == "Real"}
+    units |= {unit.name: unit for unit in others}
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted(units):
         unit = units[name]
         element = SubElement(definitions, "Unit", {"name": name})
         exponents = {"kg": unit.kg, "m": unit.m, "s": unit.s, "rad": unit.rad}
         base = {name: str(power) for name, power in exponents.items() if power}
-        SubElement(element, "BaseUnit", base | ({} if unit.factor == 1 else {"factor": _number(unit.factor)}))
+        SubElement(element, "BaseUnit", base | ({} if unit.factor == 1 else {"factor": number(unit.factor)}))
         if unit.display_name:
-            SubElement(element, "DisplayUnit", {"name": unit.display_name, "factor": _number(unit.display_factor)})
+            SubElement(element, "DisplayUnit", {"name": unit.display_name, "factor": number(unit.display_factor)})
+
+
+def typed_attributes(variable: Variable) -> dict[str, str]:
+    """What the XML says of a variable's values, the same in both versions of the standard."""
+    typed: dict[str, str] = {}
+    if variable.kind == "Real":
+        typed["unit"] = variable.unit.name
+        if variable.unit.display_name:
+            typed["displayUnit"] = variable.unit.display_name
+        if variable.least is not None:
+            typed["min"] = number(variable.least)
+        if variable.maximum is not None:
+            typed["max"] = number(variable.maximum)
+        typed["nominal"] = number(variable.nominal)
+        if variable.start is not None:
+            typed["start"] = number(float(variable.start))
+    elif variable.choice is not None:
+        typed["min"], typed["max"] = "1", str(len(variable.choice.items))
+        if variable.start is not None:
+            typed["start"] = str(variable.start)
+    elif variable.start is not None:
+        typed["start"] = boolean(bool(variable.start)) if variable.kind == "Boolean" else str(variable.start)
+    return typed
 
 
 def _scalar_variable(reference: int, variable: Variable) -> Element:
@@ -126,25 +151,7 @@ def _scalar_variable(reference: int, variable: Variable) -> Element:
     elif variable.causality == "output":
         attributes["initial"] = "calculated"
     element = Element("ScalarVariable", attributes)
-    typed: dict[str, str] = {}
-    if variable.kind == "Real":
-        typed["unit"] = variable.unit.name
-        if variable.unit.display_name:
-            typed["displayUnit"] = variable.unit.display_name
-        if variable.minimum is not None:
-            typed["min"] = _number(variable.minimum)
-        if variable.maximum is not None:
-            typed["max"] = _number(variable.maximum)
-        typed["nominal"] = _number(variable.nominal)
-        if variable.start is not None:
-            typed["start"] = _number(float(variable.start))
-    elif variable.choice is not None:
-        typed["min"], typed["max"] = "1", str(len(variable.choice.items))
-        if variable.start is not None:
-            typed["start"] = str(variable.start)
-    elif variable.start is not None:
-        typed["start"] = _boolean(bool(variable.start)) if variable.kind == "Boolean" else str(variable.start)
-    SubElement(element, variable.kind, typed)
+    SubElement(element, variable.kind, typed_attributes(variable))
     return element
 
 
@@ -168,9 +175,11 @@ def _model_structure(root: Element, interface: Interface) -> None:
         )
 
 
-def _boolean(value: bool) -> str:
+def boolean(value: bool) -> str:
+    """As XML writes it."""
     return "true" if value else "false"
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """As XML writes it, to the last digit."""
     return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import json
 import math
 import sys
@@ -23,6 +24,10 @@ SETUP, INITIALIZATION, STEPPING, FAILED, TERMINATED = "setup", "initialization",
 TIME_TOLERANCE = 1e-6
 """Largest difference [s] between the importer's communication point and the unit's own time: importers that count
 nanoseconds, or that add up their steps, stay far below it."""
+
+
+LARGEST = sys.float_info.max
+"""Largest number that is one."""
 
 
 class UnitError(Exception):
@@ -59,6 +64,8 @@ def keep_alive(*objects: object) -> None:
 
 
 def _sentence(error: BaseException) -> str:
+    if isinstance(error, ArithmeticError):
+        return f"The parameters or inputs are beyond what can be computed with ({type(error).__name__})."
     known = isinstance(error, UnitError | ValueError) and str(error)
     return str(error) if known else f"{type(error).__name__}: {error}"
 
@@ -80,14 +87,25 @@ class UnitSlave(Fmi2Slave):
         self.values: list[Value] = [_initial_value(variable) for variable in self.interface.variables]
         self.life = SETUP
         self.time = 0.0
+        self.stop_time: float | None = None
         self.stale = True  # whether parameters or inputs were set since the outputs were computed
         self._of_kind = {
             kind: frozenset(number for number, v in enumerate(self.interface.variables) if v.kind == kind)
             for kind in ("Real", "Integer", "Boolean", "String")
         }
         references = self.interface.references
-        self._inputs = [(references[v.name], v) for v in self.interface.of("input")]
+        self._inputs = [
+            (
+                references[v.name],
+                v,
+                -LARGEST if v.least is None else v.least,
+                LARGEST if v.maximum is None else v.maximum,
+            )
+            for v in self.interface.settable_in_steps
+            if v.kind == "Real"
+        ]
         self._outputs = [references[v.name] for v in self.interface.of("output")]
+        self._real_outputs = [references[v.name] for v in self.interface.of("output") if v.kind == "Real"]
 
     # --- hooks -------------------------------------------------------------------------------------------------------
 
@@ -125,38 +143,55 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
-        self.time = start_time
+        self._expect("Setting the times of the experiment", SETUP)
+        if not math.isfinite(start_time):
+            raise UnitError(f"The start time is {start_time:g} s, it must be a finite number.")
+        if stop_time is not None and not start_time <= stop_time < math.inf:
+            raise UnitError(
+                f"The stop time is {stop_time:g} s, it must be a finite number of at least the start time, "
+                f"{start_time:g} s."
+            )
+        self.time, self.stop_time = start_time, stop_time
 
     @guarded
     def enter_initialization_mode(self) -> None:
+        self._expect("Entering the initialization", SETUP)
         self.life = INITIALIZATION
 
     @guarded
     def exit_initialization_mode(self) -> None:
-        self._begin()
+        self._expect("Leaving the initialization", INITIALIZATION)
+        if self.stale:
+            self._begin()
         self.life = STEPPING
+
+    def _expect(self, call: str, *stages: str) -> None:
+        if self.life not in stages:
+            raise UnitError(f"{call} is out of order in the {self.life} stage of a unit.")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         # Nothing may escape from here: the wrapper would call it fatal, and crash when the instance is freed.
         try:
-            if self.life != STEPPING:
-                if self.life != FAILED:
-                    raise UnitError(f"A step was asked of a unit in its {self.life} stage.")
+            if self.life == FAILED:
                 return False
-            if abs(current_time - self.time) > TIME_TOLERANCE * max(1.0, abs(self.time)):
+            self._expect("A step", STEPPING)
+            if not abs(current_time - self.time) <= TIME_TOLERANCE * max(1.0, abs(self.time)):
                 raise UnitError(
                     f"The step starts at {current_time:g} s, but the unit stands at {self.time:g} s: "
                     "restore a state to go back."
                 )
-            end = current_time + step_size
-            if not end >= self.time - TIME_TOLERANCE:
-                raise UnitError(f"The step is {step_size:g} s long, it must be a number of at least 0 s.")
+            end = max(current_time + step_size, self.time)
+            if not 0.0 <= step_size <= LARGEST or end > LARGEST:
+                raise UnitError(f"The step is {step_size:g} s long, it must be a finite number of at least 0 s.")
+            stop = self.stop_time
+            if stop is not None and end > stop + TIME_TOLERANCE * max(1.0, abs(stop)):
+                raise UnitError(f"The step ends at {end:g} s, it must end by the stop time that was set, {stop:g} s.")
             values = self.values
-            for reference, variable in self._inputs:
-                value = values[reference]
-                if variable.kind == "Real" and not variable.minimum <= value <= variable.maximum:  # type: ignore[operator]
-                    raise UnitError(variable.fault(value))
+            for reference, variable, low, high in self._inputs:
+                if not low <= values[reference] <= high:  # type: ignore[operator]
+                    raise UnitError(variable.fault(values[reference]))
             self.step(end)
+            self._check_outputs()
             self.time = end
             return True
         except BaseException as error:
@@ -165,6 +200,7 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def terminate(self) -> None:
+        self._expect("Terminating", STEPPING, FAILED)
         self.life = TERMINATED
         self.close()
 
@@ -192,7 +228,17 @@ class UnitSlave(Fmi2Slave):
             if fault:
                 raise UnitError(fault)
         self.start()
+        self._check_outputs()
         self.stale = False
+
+    def _check_outputs(self) -> None:
+        for reference in self._real_outputs:
+            if not math.isfinite(self.values[reference]):  # type: ignore[arg-type]
+                name = self.interface.variables[reference].name
+                raise UnitError(
+                    f"{name} came out as {self.values[reference]:g}: the parameters or inputs are beyond what can be "
+                    "computed with."
+                )
 
     # --- values ------------------------------------------------------------------------------------------------------
 
@@ -208,7 +254,7 @@ class UnitSlave(Fmi2Slave):
         """Outputs in initialization mode; parameters that are not yet allowed leave them undefined."""
         try:
             self._begin()
-        except (UnitError, ValueError):
+        except (UnitError, ValueError, ArithmeticError):
             for reference in self._outputs:
                 self.values[reference] = _initial_value(self.interface.variables[reference])
 
@@ -219,7 +265,9 @@ class UnitSlave(Fmi2Slave):
             variable = self.interface.variables[reference]
             if variable.causality == "output":
                 raise UnitError(f"{variable.name} is an output, it cannot be set.")
-            if variable.causality == "parameter" and self.life not in (SETUP, INITIALIZATION):
+            if self.life == TERMINATED:
+                self._expect("Setting a variable", SETUP, INITIALIZATION, STEPPING, FAILED)
+            if variable.variability == "fixed" and self.life not in (SETUP, INITIALIZATION):
                 raise UnitError(f"{variable.name} is a fixed parameter, it cannot be set after initialization.")
             self.values[reference] = value
             self.stale = True
@@ -273,6 +321,7 @@ class UnitSlave(Fmi2Slave):
             "unit": self._identity(),
             "life": self.life,
             "time": self.time,
+            "stop_time": self.stop_time,
             "stale": self.stale,
             "values": list(self.values),
             "snapshot": self.snapshot() if self.life == STEPPING else None,
@@ -280,20 +329,44 @@ class UnitSlave(Fmi2Slave):
 
     @guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if state["unit"] != self._identity():
-            raise UnitError(f"The state belongs to {state['unit']}, this is {self._identity()}.")
+        if state.get("unit") != self._identity():
+            raise UnitError(
+                state.get("fault") or f"The state belongs to {state.get('unit')}, this is {self._identity()}."
+            )
         self.values = list(state["values"])
-        self.time, self.life, self.stale = state["time"], state["life"], state["stale"]
+        self.time, self.stop_time = state["time"], state["stop_time"]
+        self.life, self.stale = state["life"], state["stale"]
         if state["snapshot"] is not None:
             self.restore(state["snapshot"])
+        else:  # what has gone on since is no part of the state
+            self.close()
+            self.stale = True
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state).encode()
+        return sealed(json.dumps(state).encode())
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        return json.loads(state.decode())
+        # An exception would leave the wrapper with references that it does not own, and none of an instance is known
+        # here: bytes that are no state become one that cannot be restored.
+        try:
+            return json.loads(opened(state))
+        except UnitError as error:
+            return {"fault": str(error)}
+
+
+def sealed(data: bytes) -> bytes:
+    """The bytes of a state with a digest, by which damage is seen."""
+    return hashlib.sha256(data).hexdigest().encode() + b"\n" + data
+
+
+def opened(data: bytes) -> bytes:
+    """What ``sealed`` was given."""
+    digest, _, content = data.partition(b"\n")
+    if hashlib.sha256(content).hexdigest().encode() != digest:
+        raise UnitError("The bytes are not a state of this unit, or are damaged.")
+    return content
 
 
 def _initial_value(variable: Variable) -> Value:

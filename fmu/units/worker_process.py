@@ -21,7 +21,7 @@ from typing import IO, Any
 
 from .slave import UnitError
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Version of the requests and answers; the worker names its own when it starts."""
 
 RECORDED = (
@@ -36,13 +36,16 @@ INTERPRETER_VARIABLE = "WARP_MPM_PYTHON"
 RECORD = "worker.json"
 """File in the archive's resources that names the Python which built it and where it found this project."""
 
+PLAIN_RECORD = "worker.txt"
+"""The same, a line each, for the unit in C."""
+
 START_TIME_LIMIT = 60.0
 """Longest time [s] that a worker may take to say that it is there."""
 
 # What a host sets for its own Python, or preloads into it, must not reach the worker's.
 _HOST_ONLY = ("LD_PRELOAD", "PYTHONHOME", "PYTHONPATH", "PYTHONEXECUTABLE", "PYTHONSTARTUP", "__PYVENV_LAUNCHER__")
 _CHUNK = 1 << 20
-_LAUNCH = "import sys; sys.path[:0] = sys.argv[1:]; from fmu.worker import main; main()"
+LAUNCH = "import sys; sys.path[:0] = sys.argv[1:]; from fmu.worker import main; main()"
 
 
 class WorkerProcess:
@@ -60,7 +63,7 @@ class WorkerProcess:
         try:
             self._process: subprocess.Popen[bytes] | None = subprocess.Popen(
                 # -P: the host's working folder is no place to import from.
-                [interpreter, "-P", "-c", _LAUNCH, *import_path],
+                [interpreter, "-P", "-c", LAUNCH, *import_path],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
@@ -78,7 +81,15 @@ class WorkerProcess:
             ) from None
         assert self._process.stdout is not None
         self._lines = _Lines(self._process.stdout)
-        hello = self._answer("start", START_TIME_LIMIT)
+        try:
+            hello = self._answer("start", START_TIME_LIMIT)
+        except UnitError as error:
+            if "No module named" not in str(error):
+                raise
+            raise UnitError(
+                f"The Python {interpreter} has no warp-mpm-impact (No module named 'fmu'): install it there, or set "
+                f"{INTERPRETER_VARIABLE} to the Python of an environment that has it."
+            ) from None
         if hello.get("protocol") != PROTOCOL:
             self.close()
             raise UnitError(
@@ -107,6 +118,11 @@ class WorkerProcess:
     def process_id(self) -> int | None:
         """Number of the worker's process, None after its end."""
         return self._process.pid if self._process else None
+
+    @property
+    def alive(self) -> bool:
+        """Whether the worker still runs."""
+        return self._process is not None and self._process.poll() is None
 
     def close(self, patience: float = 5.0) -> None:
         """End the worker and wait for its end; without patience [s] it is killed."""

@@ -471,14 +471,3 @@ def test_a_step_back_needs_a_state(unit: str, open_unit: Open, capfd: pytest.Cap
         status = error.status
     assert status >= 2
     assert "the unit stands at 1 s" in "".join(capfd.readouterr())
-
-
-def test_anchor_yields_and_remembers(open_unit: Open) -> None:
-    host = open_unit("GroundAnchor").initialize(stiffness=1e5, slack=0.1, yield_force=4e4)
-    expected = [(0.1, 0.0, False), (0.3, -2e4, False), (0.7, -4e4, True), (0.6, -3e4, True), (0.2, 0.0, True)]
-    for displacement, force, yielded in expected:
-        host["barrier_displacement"] = displacement
-        host.run(0.1)
-        assert host["force"] == pytest.approx(force, abs=1e-9)
-        assert bool(host["yielded"]) is yielded
-        assert host["utilisation"] == pytest.approx(-force / 4e4)

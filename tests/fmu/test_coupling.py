@@ -15,8 +15,10 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from scipy.integrate import solve_ivp
 
-from fmu import archive
+from analytic.impact import Impact
+from fmu import c_unit
 from warp_mpm import Scenario, Simulation
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +43,8 @@ system = documented("system")
 
 @pytest.fixture(scope="module")
 def folder(archives: dict[str, Path]) -> Path:
-    return archives["DebrisFlow"].parent
+    paths = [archives[name] for name in coupled.UNITS]
+    return paths[0].parent
 
 
 def monolithic(end: float, anchor: dict[str, float] | None = None) -> float:
@@ -106,9 +109,9 @@ def own(archives: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
     scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(OWN_SCENE)
     file = folder / "own.json"
     file.write_text(json.dumps(scenario.resolved()))
-    (unit,) = [unit for unit in archive.PYTHON_UNITS if unit.name == "DebrisFlow"]
-    archive.build_python_unit(unit, folder, scenario=file)
-    for name in ("BarrierSliding", "GroundAnchor"):
+    (unit,) = [unit for unit in c_unit.C_UNITS if unit.name == "DebrisFlowC"]
+    c_unit.build_c_unit(unit, folder, platforms=(c_unit.host_platform(),), scenario=file)
+    for name in ("BarrierSlidingC", "GroundAnchorC"):
         shutil.copy(archives[name], folder)
     return scenario, folder
 
@@ -232,7 +235,7 @@ def test_ten_line_script_runs(folder: Path) -> None:
         (["--end", "soon"], "--end: soon is not allowed; it must be a finite number greater than 0."),
         (["--step", "7"], "--step: 7 is not allowed; it must be at most --end, 6."),
         (["--spacing", "-0.1"], "--spacing: -0.1 is not allowed; it must be a finite number at least 0."),
-        (["--archives", "nowhere"], "--archives: nowhere must hold DebrisFlow, BarrierSliding, GroundAnchor; "),
+        (["--archives", "nowhere"], "--archives: nowhere must hold DebrisFlowC, BarrierSlidingC, GroundAnchorC; "),
     ],
 )
 def test_script_refuses_in_one_sentence(
@@ -250,3 +253,49 @@ def test_script_refuses_in_one_sentence(
     assert said.out == ""
     assert said.err.startswith(sentence)
     assert said.err.count("\n") == 1
+
+
+def test_anchor_that_yields_beside_a_dashpot(folder: Path) -> None:
+    """Against SciPy, which has the barrier, the spring that yields and the dashpot in one system of equations."""
+    example = documented("damped_anchor")
+    found = example.slide(folder, yield_force=50e3, damping=10e3)
+    impact = Impact(flow_length=15.0, flow_height=3.0, geometry_change=0.41, rise_ratio=0.35, **example.BARRIER)
+    friction = 0.29 * 81e3 * 9.81
+
+    def motion(t: float, y: list[float]) -> list[float]:
+        x, v, plastic = y
+        tension = min(max(2e5 * (x - plastic), 0.0), 50e3)
+        yields = 2e5 * (x - plastic) >= 50e3 and v > 0
+        driving = impact.force(t) - tension - 10e3 * v
+        held = v <= 0 and abs(driving) <= friction
+        return [max(v, 0.0), 0.0 if held else (driving - friction) / 81e3, v if yields else 0.0]
+
+    start, x, plastic = 0.0, 0.0, 0.0
+    solved = solve_ivp(motion, (0.0, 4.0), [x, start, plastic], max_step=1e-3, rtol=1e-8)
+    assert found["displacement"] == pytest.approx(solved.y[0].max(), rel=5e-3)  # first order in the step of 1 ms
+    assert found["anchor_force"] == 50e3
+    assert found["plastic_elongation"] == pytest.approx(found["displacement"] - 0.25, abs=1e-9)
+    free = example.slide(folder, yield_force=0.0, damping=0.0, step=0.01)
+    assert free["displacement"] == pytest.approx(1.36484471, rel=1e-8)
+
+
+def test_gauge_warns_before_the_flow_arrives(folder: Path) -> None:
+    """The front goes at 20 m/s from the gauge to the barrier: that is the time there is."""
+    example = documented("warning_system")
+    found = example.run(folder, threshold=0.5, gauge=-1.5, spacing=0.75)
+    assert found.alarm == pytest.approx((3.0 - 1.5) / 20.0, abs=0.045)  # the gauge sees two spacings
+    assert 0.08 < found.arrival < 0.25
+    assert found.margin == pytest.approx(found.arrival - found.alarm - 0.07)
+    late = example.run(folder, threshold=0.5, gauge=-1.5, closing=0.5, spacing=0.75)
+    assert late.margin < 0.0 < late.arrival
+    never = example.run(folder, threshold=50.0, spacing=0.75)
+    assert math.isinf(never.alarm)
+    assert math.isinf(never.closed)
+
+
+def test_energy_is_accounted_for(folder: Path) -> None:
+    account = documented("energy_account").run(folder, spacing=SPACING, end=1.0)
+    assert account.flow_work > 5e5
+    assert min(account.barrier, account.base, account.anchor) > 0.01 * account.flow_work
+    assert abs(account.left_over) < 1e-9 * account.flow_work
+    assert account.flow_lost > account.flow_work

@@ -140,6 +140,7 @@ def test_command_compares_a_scenario(tmp_path: Path) -> None:
     (content,) = json.loads(done.stdout)
     assert [unit["name"] for unit in content["units"]] == [
         "paper",
+        "variant calibrated",
         "calibrated",
         "with vertical load",
         "simulated force",
@@ -210,6 +211,10 @@ def test_command_tells_a_broken_archive(tmp_path: Path) -> None:
             ["build", "--platform", "amiga", "--only", "BarrierSlidingC"],
             "--platform = amiga is not allowed; it must be one of linux64",
         ),
+        (
+            ["build", "--platform", "win64", "--only", "DebrisFlowC"],
+            "--platform = win64 is not allowed for DebrisFlowC; it must be one of linux64, darwin64.",
+        ),
         (["build", "--platform", "amiga"], "--platform = amiga is not allowed"),
         (["build", "--scenario", "nowhere.json"], "nowhere.json"),
         (["check", "nowhere.fmu"], "nowhere.fmu is not there."),
@@ -233,20 +238,28 @@ def test_bad_input_is_one_sentence(
 
 
 @pytest.mark.parametrize(
-    "platforms",
+    ("unit", "platforms", "binaries"),
     [
-        ("linux64", "darwin64"),
-        # For Windows the compiler first compiles Microsoft's C library: 160 s of processor time, once per machine.
-        pytest.param(("linux64", "win64", "darwin64"), marks=pytest.mark.slow),
+        ("BarrierSlidingC", ("linux64", "darwin64"), "darwin64, linux64"),
+        # Compilers for other machines first compile a C library: 160 s of processor time for Windows, once per machine.
+        *(
+            pytest.param(unit, ("linux64", "linux-aarch64", "win64", "darwin64"), binaries, marks=pytest.mark.slow)
+            for unit, binaries in (
+                ("BarrierSlidingC", "darwin64, linux64, win64"),
+                ("GroundAnchorC3", "aarch64-darwin, aarch64-linux, x86_64-darwin, x86_64-linux, x86_64-windows"),
+                ("DebrisFlowC3", "aarch64-darwin, aarch64-linux, x86_64-darwin, x86_64-linux"),
+            )
+        ),
     ],
 )
-def test_command_builds_the_c_unit_for_all_platforms(
-    platforms: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_command_builds_units_in_c_for_all_platforms(
+    unit: str, platforms: tuple[str, ...], binaries: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(c_unit, "PLATFORMS", {name: c_unit.PLATFORMS[name] for name in platforms})
-    done = CliRunner().invoke(app, ["build", "--only", "BarrierSlidingC", "--out", str(tmp_path)])
+    monkeypatch.setattr(archive, "simulated_reference", lambda scenario: {})
+    done = CliRunner().invoke(app, ["build", "--only", unit, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert done.stdout.endswith(f" kB  for {', '.join(platforms)}\n")
+    assert done.stdout.endswith(f" kB  for {binaries}\n")
     assert done.stderr == ""
 
 
@@ -255,7 +268,7 @@ def test_command_says_for_which_platform_alone_the_c_unit_is(tmp_path: Path, mon
     done = CliRunner().invoke(app, ["build", "--only", "BarrierSlidingC", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert done.stdout.endswith(f" kB  for {c_unit.host_platform()}\n")
-    assert 'for other platforms needs the package ziglang: pip install "ziglang>=' in done.stderr
+    assert 'units in C for other platforms needs the package ziglang: pip install "ziglang>=' in done.stderr
 
 
 def test_command_leaves_nothing_where_a_compiler_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

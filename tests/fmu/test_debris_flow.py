@@ -360,7 +360,10 @@ def test_interpreter_without_the_project_is_reported(
     venv.create(tmp_path / "empty", symlinks=os.name == "posix", with_pip=False)
     folder = "bin" if os.name == "posix" else "Scripts"
     monkeypatch.setenv(INTERPRETER_VARIABLE, str(tmp_path / "empty" / folder / "python"))
-    with pytest.raises(Exception, match=r"ended with exit code 1 .*No module named 'fmu'"):
+    with pytest.raises(
+        Exception,
+        match=rf"The Python .*empty.* has no warp-mpm-impact .*install it there, or set {INTERPRETER_VARIABLE}",
+    ):
         WorkerProcess(str(resources))
 
 

@@ -7,12 +7,11 @@ import subprocess
 import sys
 import sysconfig
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from fmu import c_unit
 
 ROOT = Path(__file__).parents[2]
 FINAL_DISPLACEMENT = 1.36484471  # of the unit's start values, Fig. 9 with lambda = 0.41 and tau = 0.35
@@ -111,15 +110,10 @@ class TestOtherImporters:
         assert result.returncode != -11, "segmentation fault"
 
 
-@pytest.fixture(scope="module")
-def c_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def c_host(c_program: Callable[[Path], Path]) -> Path:
     """The C host of the documentation, compiled."""
-    program = tmp_path_factory.mktemp("host") / "host"
-    compiler = [sys.executable, "-m", "ziglang", "cc"] if c_unit.has_cross_compiler() else ["cc"]
-    source = ROOT / "docs" / "cosimulation" / "host.c"
-    result = run([*compiler, "-Wall", "-Werror", "-o", program, source, "-ldl"])
-    assert result.returncode == 0, result.stderr
-    return program
+    return c_program(ROOT / "docs" / "cosimulation" / "host.c")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the host of the documentation is written for Linux")
@@ -162,3 +156,81 @@ class TestPlainCHost:
         result = run([c_host, unzipped["BarrierSliding"], "impact_force", 0.01, 1.0])
         assert result.returncode == 1
         assert "undefined symbol" in result.stderr
+
+
+TWO_UNITS = """
+#include <stdio.h>
+#include "fmi2Functions.h"
+
+#define UNIT(NAME) \\
+    fmi2Component NAME##_fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String, const fmi2CallbackFunctions *, \\
+                                         fmi2Boolean, fmi2Boolean); \\
+    fmi2Status NAME##_fmi2EnterInitializationMode(fmi2Component); \\
+    fmi2Status NAME##_fmi2ExitInitializationMode(fmi2Component); \\
+    fmi2Status NAME##_fmi2DoStep(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean); \\
+    fmi2Status NAME##_fmi2GetReal(fmi2Component, const fmi2ValueReference[], size_t, fmi2Real[]); \\
+    fmi2Status NAME##_fmi2SetReal(fmi2Component, const fmi2ValueReference[], size_t, const fmi2Real[]); \\
+    void NAME##_fmi2FreeInstance(fmi2Component);
+UNIT(BarrierSlidingC)
+UNIT(GroundAnchorC)
+
+int main(int count, char *arguments[]) {
+    (void)count;
+    fmi2Component barrier = BarrierSlidingC_fmi2Instantiate("b", fmi2CoSimulation, arguments[1], "", NULL, 0, 0);
+    fmi2Component anchor = GroundAnchorC_fmi2Instantiate("a", fmi2CoSimulation, arguments[2], "", NULL, 0, 0);
+    if (!barrier || !anchor) return 1;
+    BarrierSlidingC_fmi2EnterInitializationMode(barrier), BarrierSlidingC_fmi2ExitInitializationMode(barrier);
+    GroundAnchorC_fmi2EnterInitializationMode(anchor), GroundAnchorC_fmi2ExitInitializationMode(anchor);
+    const fmi2ValueReference displacement = DISPLACEMENT, external = EXTERNAL, moved = MOVED, force = FORCE;
+    double value;
+    for (int step = 0; step < 400; step++) {
+        if (BarrierSlidingC_fmi2DoStep(barrier, step * 0.01, 0.01, 1)) return 2;
+        BarrierSlidingC_fmi2GetReal(barrier, &displacement, 1, &value);
+        GroundAnchorC_fmi2SetReal(anchor, &moved, 1, &value);
+        if (GroundAnchorC_fmi2DoStep(anchor, step * 0.01, 0.01, 1)) return 3;
+        GroundAnchorC_fmi2GetReal(anchor, &force, 1, &value);
+        BarrierSlidingC_fmi2SetReal(barrier, &external, 1, &value);
+    }
+    BarrierSlidingC_fmi2GetReal(barrier, &displacement, 1, &value);
+    printf("%.17g", value);
+    BarrierSlidingC_fmi2FreeInstance(barrier), GroundAnchorC_fmi2FreeInstance(anchor);
+    return 0;
+}
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="compiles as Linux does")
+def test_two_units_in_one_program(
+    c_compiler: list[str], unzipped: dict[str, Path], open_unit: Callable[[str], Any], tmp_path: Path
+) -> None:
+    """Linked statically from the archives' sources, with a prefix each, and coupled: as their shared libraries do."""
+    from fmpy import read_model_description
+
+    barrier, anchor = open_unit("BarrierSlidingC").initialize(), open_unit("GroundAnchorC").initialize()
+    for _ in range(400):
+        anchor["barrier_displacement"] = barrier.run(0.01)["barrier_displacement"]
+        barrier["external_force"] = anchor.run(0.01)["force"]
+    objects, guids = [], []
+    for name in ("BarrierSlidingC", "GroundAnchorC"):
+        sources, made = unzipped[name] / "sources", tmp_path / f"{name}.o"
+        flags = ["-std=c99", "-O2", "-ffp-contract=off", f"-DFMI2_FUNCTION_PREFIX={name}_", "-I", sources]
+        done = run([*c_compiler, "-c", *flags, "-o", made, sources / "fmi2.c"])
+        assert done.returncode == 0, done.stderr
+        objects.append(made)
+        guids.append(read_model_description(str(unzipped[name])).guid)
+    references = {
+        "DISPLACEMENT": barrier.variables["barrier_displacement"],
+        "EXTERNAL": barrier.variables["external_force"],
+        "MOVED": anchor.variables["barrier_displacement"],
+        "FORCE": anchor.variables["force"],
+    }
+    source, program = tmp_path / "two.c", tmp_path / "two"
+    source.write_text(TWO_UNITS)
+    macros = [f"-D{name}={variable.valueReference}" for name, variable in references.items()]
+    include = ["-I", unzipped["BarrierSlidingC"] / "sources"]
+    done = run([*c_compiler, *macros, *include, "-o", program, source, *objects, "-lm"])
+    assert done.returncode == 0, done.stderr
+    done = run([program, *guids])
+    assert done.returncode == 0, done.returncode
+    # The program counts its steps, the importer adds them up.
+    assert float(done.stdout) == pytest.approx(barrier["barrier_displacement"], rel=1e-12)

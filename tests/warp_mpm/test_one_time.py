@@ -201,7 +201,7 @@ def test_a_unit_s_step_beside_another_holds_its_outputs(coarse, tmp_path):
     path.write_text(json.dumps(coarse.resolved()))
     worker = Worker()
     worker.open(scenario=str(path), device="cpu", spacing=None, driven=False)
-    inputs = {"barrier_velocity": None, "external_force": 0.0, "overtopped": False}
+    inputs = {"barrier_velocity": None, "external_force": 0.0, "gauge": None}
     for number in range(1, 61):
         before = worker.step(until=number * 0.005, **inputs)
     assert before["impact_force_x"] > 0.0

@@ -1,7 +1,4 @@
 /* The closed-form impact and the sliding barrier: the C twin of impact.py, sliding.py and barrier_sliding.py. */
-#include <math.h>
-
-#include "unit.h"
 
 #define DEGREE (3.14159265358979323846 / 180) /* [rad] */
 
@@ -197,6 +194,11 @@ static double momentum_closed_impulse(const Impact *impact) {
 
 /* --- the unit (barrier_sliding.py) ---------------------------------------------------------------------------------- */
 
+/* The base's resistance to sliding while the flow pushes with a force, which brings its vertical load along. */
+static double friction_under(const Impact *impact, Loads loads, double force) {
+    return impact->tangent * fmax(loads.pressing + impact->vertical_load_ratio * force, 0);
+}
+
 static int phase_of(const Model *model, double time, Loads loads, double friction) {
     const Impact *impact = &model->impact;
     double since = time - impact->arrival;
@@ -220,8 +222,7 @@ static void write_outputs(Unit *unit, double time, Loads loads) {
     Model *model = &unit->state.model;
     const Impact *impact = &model->impact;
     double *values = unit->state.values, since = time - impact->arrival;
-    double share = impact->force_is_input ? 0 : impact->vertical_load_ratio;
-    double friction = impact->tangent * (loads.pressing + share * model->force);
+    double friction = friction_under(impact, loads, model->force);
     double v1 = impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input
                     ? printed_flow_velocity(impact, since)
                     : impact->speed - (impact->force_is_input ? model->impulse : impulse_until(impact, since)) /
@@ -238,17 +239,33 @@ static void write_outputs(Unit *unit, double time, Loads loads) {
     values[IMPACT_PHASE] = phase_of(model, time, loads, friction);
 }
 
+/* What the base friction must be, at the start and whenever the importer changes it. */
+static int check_friction(Unit *unit, double tangent) {
+    const Impact *impact = &unit->state.model.impact;
+    double slope = unit->state.values[SLOPE], steepest = fabs(tan(slope * DEGREE));
+    if (!impact->fixed && steepest > 0 && tangent <= steepest)
+        return refuse(unit, "base_friction is %g, on a slope of %g degrees it must be above %.4g, else the barrier "
+                            "slides by its own weight.", tangent, slope, steepest);
+    if (impact->vertical_load_ratio * tangent >= 1)
+        return refuse(unit, "vertical_load_ratio is %g, it must be in [0, %g).", impact->vertical_load_ratio, 1 / tangent);
+    return 1;
+}
+
 static int advance(Unit *unit, double end) {
     Model *model = &unit->state.model;
-    const Impact *impact = &model->impact;
+    Impact *impact = &model->impact;
     const double *values = unit->state.values;
     double external = values[EXTERNAL_FORCE], load = values[VERTICAL_LOAD], force = values[IMPACT_FORCE_INPUT];
-    double start = unit->state.time;
-    Loads loads = loads_on(impact, external, load);
-    int acted = external != 0 || load != 0;
+    double start = unit->state.time, tangent = impact->fixed ? 0 : values[BASE_FRICTION];
+    int tuned = tangent != impact->tangent, acted = external != 0 || load != 0 || tuned;
     if (acted && impact->variant == VARIANT_AS_PRINTED)
-        return refuse(unit, "variant is 3 (as_printed), which is a set of functions of time: external_force and "
-                            "vertical_load must be 0, or choose 1 (stick_slip).");
+        return refuse(unit, tuned ? "variant is 3 (as_printed), which is a set of functions of time: base_friction must "
+                                    "stay as it was, or choose 1 (stick_slip)."
+                                  : "variant is 3 (as_printed), which is a set of functions of time: external_force and "
+                                    "vertical_load must be 0, or choose 1 (stick_slip).");
+    if (tuned && !check_friction(unit, tangent)) return 0;
+    impact->tangent = tangent;
+    Loads loads = loads_on(impact, external, load);
     if (!model->integrated && !acted) {
         follow_closed_form(model, end);
         write_outputs(unit, end, loads);
@@ -258,7 +275,7 @@ static int advance(Unit *unit, double end) {
     if (impact->force_is_input) {
         if (!impact->fixed)
             slide(&model->displacement, &model->velocity, end - start, force + loads.pushing, 0,
-                  impact->tangent * loads.pressing, 0, impact->mass);
+                  friction_under(impact, loads, force), 0, impact->mass);
         model->force = force;
         model->impulse += force * (end - start);
         model->peak_force = fmax(model->peak_force, force);
@@ -271,7 +288,7 @@ static int advance(Unit *unit, double end) {
     return 1;
 }
 
-int unit_start(Unit *unit) {
+static int unit_start(Unit *unit) {
     const double *values = unit->state.values;
     Model *model = &unit->state.model;
     Impact *impact = &model->impact;
@@ -298,13 +315,7 @@ int unit_start(Unit *unit) {
     impact->vertical_load_ratio = values[VERTICAL_LOAD_RATIO];
     if (impact->variant == VARIANT_AS_PRINTED && impact->vertical_load_ratio != 0)
         return refuse(unit, "vertical_load_ratio is %g, it must be 0 with as_printed.", impact->vertical_load_ratio);
-    double steepest = fabs(tan(values[SLOPE] * DEGREE));
-    if (!impact->fixed && steepest > 0 && impact->tangent <= steepest)
-        return refuse(unit, "base_friction is %g, on a slope of %g degrees it must be above %.4g, else the barrier "
-                            "slides by its own weight.", impact->tangent, values[SLOPE], steepest);
-    if (impact->vertical_load_ratio * impact->tangent >= 1)
-        return refuse(unit, "vertical_load_ratio is %g, it must be in [0, %g).", impact->vertical_load_ratio,
-                      1 / impact->tangent);
+    if (!check_friction(unit, impact->tangent)) return 0;
     impact->initial_velocity = v20;
     impact->arrival = values[ARRIVAL_TIME];
     double approach = impact->speed - v20;
@@ -325,4 +336,60 @@ int unit_start(Unit *unit) {
     return 1;
 }
 
-int unit_step(Unit *unit, double end) { return advance(unit, end); }
+static int unit_step(Unit *unit, double end) { return advance(unit, end); }
+
+/* --- rates of the outputs ----------------------------------------------------------------------------------------------- */
+
+static double force_rate_at(const Impact *impact, double since) {
+    double T1 = impact->rise_time, T2 = impact->duration, peak = impact->peak_force;
+    if (since <= 0 || since > T2) return 0;
+    return since <= T1 ? peak / T1 : -peak / (T2 - T1);
+}
+
+/* Acceleration [m/s2] of the barrier at the end of the last step, under the loads as they are now. */
+static double acceleration_of(const Unit *unit, double since) {
+    const Model *model = &unit->state.model;
+    const Impact *impact = &model->impact;
+    const double *values = unit->state.values;
+    if (impact->fixed) return 0;
+    if (impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input) {
+        double deceleration = friction_deceleration(impact), T2 = impact->duration;
+        if (since <= 0 || (since > T2 && model->velocity == 0)) return 0;
+        return since <= T2 ? since * 2 * impact->impulse / (T2 * T2) / impact->mass - deceleration : -deceleration;
+    }
+    Loads loads = loads_on(impact, values[EXTERNAL_FORCE], values[VERTICAL_LOAD]);
+    if (!model->integrated && since <= 0) return 0; /* it has come with its velocity as given */
+    double driving = model->force + loads.pushing, friction = friction_under(impact, loads, model->force);
+    double direction = model->velocity != 0 ? copysign(1.0, model->velocity) : breakaway(driving, 0, friction, 0);
+    return direction == 0 ? 0 : (driving - direction * friction) / impact->mass;
+}
+
+static int unit_rate(Unit *unit, int reference, double *rate) {
+    const Model *model = &unit->state.model;
+    const Impact *impact = &model->impact;
+    const double *values = unit->state.values;
+    double since = unit->state.time - impact->arrival;
+    double flow = -model->force / impact->flow_mass;
+    if (impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input) {
+        double T2 = impact->duration;
+        flow = since <= 0 ? 0
+               : since <= T2 ? -since * 2 * impact->impulse / (T2 * T2) / impact->flow_mass
+               : values[FLOW_VELOCITY] > 0 ? -friction_deceleration(impact)
+                                           : 0;
+    }
+    switch (reference) {
+    case IMPACT_FORCE: *rate = impact->force_is_input ? 0 : force_rate_at(impact, since); return 1;
+    case PEAK_FORCE:
+    case PEAK_PRESSURE: *rate = 0; return 1;
+    case BARRIER_VELOCITY: *rate = acceleration_of(unit, since); return 1;
+    case BARRIER_DISPLACEMENT: *rate = values[BARRIER_VELOCITY]; return 1;
+    case FLOW_VELOCITY: *rate = flow; return 1;
+    case FLOW_KINETIC_ENERGY: *rate = impact->flow_mass * values[FLOW_VELOCITY] * flow; return 1;
+    case BARRIER_KINETIC_ENERGY:
+        *rate = impact->fixed ? 0 : impact->mass * values[BARRIER_VELOCITY] * acceleration_of(unit, since);
+        return 1;
+    default: return refuse(unit, "%s has no derivative.", TABLE[reference].name);
+    }
+}
+
+NOTHING_BEYOND_THE_STATE

@@ -1,6 +1,6 @@
 /* State of the sliding barrier; included by unit.h. Equations and names as in impact.py and barrier_sliding.py. */
-#ifndef MODEL_H
-#define MODEL_H
+#ifndef BARRIER_SLIDING_H
+#define BARRIER_SLIDING_H
 
 typedef struct {
     int fixed, force_is_input, variant;
@@ -18,5 +18,7 @@ typedef struct {
     double impulse, peak_force; /* so far, where the force is an input */
     double force;
 } Model;
+
+PLAIN_STATE
 
 #endif
