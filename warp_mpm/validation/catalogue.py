@@ -14,6 +14,7 @@ from warp_mpm.validation import (
     granular,
     jets,
     paper,
+    paper_forces,
     phases,
     refinement,
     rheology,
@@ -35,6 +36,7 @@ CASES: tuple[Case, ...] = (
     *case_one.CASES,
     *refinement.CASES,
     *paper.CASES,
+    *paper_forces.CASES,
 )
 
 
