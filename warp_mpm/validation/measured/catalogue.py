@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from warp_mpm.validation.case import Case
-from warp_mpm.validation.measured import fronts, water_on_a_wall
+from warp_mpm.validation.measured import debris_flume, field_bounds, fronts, water_on_a_wall
 from warp_mpm.validation.measured.given import Given, measured_case
 
 
@@ -34,6 +34,26 @@ def measured_cases(given: Given) -> tuple[Case, ...]:
             "Columns of water as wide as deep, and half as wide, collapse on a dry bed.",
             "Martin and Moyce (1952), Koshizuka and Oka (1996), Lobovský et al. (2014)",
             fronts.fronts,
+            given,
+        ),
+        measured_case(
+            "debris-flume",
+            "Debris in a flume of 95 m",
+            "About 10 m³ of sand and gravel, without and with mud, let go at t = 0 down a rough bed of 31°: "
+            "depth, normal stress and pore pressure on the bed at 32 and 66 m; three spacings, and every corner of "
+            "the published ranges.",
+            "Iverson, Logan, LaHusen and Berti (2010), J. Geophys. Res. 115, F03005, ensemble means and deviations; "
+            "settings as published for D-Claw",
+            debris_flume.debris_flume,
+            given,
+        ),
+        measured_case(
+            "field-bounds",
+            "Bands from the field: context, no validation",
+            "Greatest forces of our fixed barriers over ρ h v², and how far case 1 slides by its conductivity, before "
+            "bands from field, centrifuge and guidelines.",
+            "Bugnion et al. (2012) and University of Salerno, abstracts; guidelines recalled",
+            field_bounds.field_bounds,
             given,
         ),
     )
