@@ -21,6 +21,14 @@ def measured_cases(given: Given) -> tuple[Case, ...]:
             given,
         ),
         measured_case(
+            "water-behind-a-gate",
+            "Water on a wall, with the gate and a bed that holds it",
+            "The same with the gate lifted at its measured speed, and a bed on which water does not slip.",
+            "as above",
+            water_on_a_wall.lobovsky_with_gate,
+            given,
+        ),
+        measured_case(
             "buchner-wall",
             "Water on a wall, another tank",
             "The same proportions at H = 0.6 m, with sensors of 90 mm at 160 and 584 mm.",

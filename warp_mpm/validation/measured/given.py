@@ -6,6 +6,8 @@ import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from warp_mpm.validation.case import Case, Check, Outcome, Point, Table, number
 from warp_mpm.validation.measured.tables import Tables
 
@@ -39,7 +41,12 @@ def measured_case(
 
 
 def simulated(
-    quantity: str, measured: float, values: Sequence[float], *, band: tuple[float, float] | None = None
+    quantity: str,
+    measured: float,
+    values: Sequence[float],
+    *,
+    band: tuple[float, float] | None = None,
+    by: str = "simulated",
 ) -> Point:
     """A figure of the finest of several spacings; its bar reaches to that of the spacing before.
 
@@ -48,17 +55,19 @@ def simulated(
         measured: its measured value.
         values: ours at each spacing, coarsest first.
         band: ends of what was measured; None where they are not known.
+        by: what computed it, in words.
     """
     low, high = (measured, measured) if band is None else band
-    return Point(quantity, "simulated", measured, low, high, values[-1], min(values[-2:]), max(values[-2:]))
+    return Point(quantity, by, measured, low, high, values[-1], min(values[-2:]), max(values[-2:]))
 
 
 class Ladder:
     """Figures at several spacings, coarsest first; the finest one is judged."""
 
-    def __init__(self, spacings: Sequence[str]):
-        """Args: spacings: as they are printed."""
+    def __init__(self, spacings: Sequence[str], *, by: str = "simulated"):
+        """Args: spacings: as they are printed; by: what computes, in words of the picture of all figures."""
         self.spacings = spacings
+        self.by = by
         self.checks: list[Check] = []
         self.points: list[Point] = []
         self._rows: list[tuple[str, ...]] = []
@@ -80,8 +89,8 @@ class Ladder:
         check = judge(values[-1])
         self.checks.append(check)
         self._rows.append((check.quantity, check.unit, check.reference, *(number(value) for value in values)))
-        if measured is not None:
-            self.points.append(simulated(check.quantity, measured[0], values, band=measured[1:]))
+        if measured is not None and np.isfinite(values).all():
+            self.points.append(simulated(check.quantity, measured[0], values, band=measured[1:], by=self.by))
 
     @property
     def table(self) -> Table:

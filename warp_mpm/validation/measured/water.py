@@ -2,7 +2,8 @@
 
 Water is the perfect fluid of the dam break among the known answers: a skeleton without strength whose voids are full of
 liquid, undrained, on smooth ground between smooth walls. Viscosity and surface tension are not in it (at 0.3 m the
-Reynolds number is 5e5 and the Weber number 1e4), nor is air, nor the gate, which is gone at once. Sound is at ten times
+Reynolds number is 5e5 and the Weber number 1e4), nor is air, nor the gate, which is gone at once; `WALL_WITH_GATE` has
+the gate, and a bed that holds the water. Sound is at ten times
 the speed of the front, so that the density changes by about a percent; a real impact's milliseconds of compression are
 not resolved.
 
@@ -14,12 +15,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from warp_mpm.kernels import layout as at
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.bodies import Body, Driven, Outline
 from warp_mpm.validation.case import Array
 from warp_mpm.validation.measured.given import Given
 from warp_mpm.validation.scenes import box, fixed, scene
@@ -35,7 +38,7 @@ SOUND = 17.5
 RECORD = 0.02
 """Interval of the records in t*."""
 
-WATER = {
+WATER: dict[str, Any] = {
     "grain_density_kg_per_m3": DENSITY,
     "liquid_density_kg_per_m3": DENSITY,
     "young_modulus_Pa": 1e3,
@@ -43,6 +46,12 @@ WATER = {
     "liquid_bulk_modulus_Pa": 0.5 * DENSITY * SOUND**2 * G * DEPTH,
 }
 """A mixture of water and water of a porosity of one half; its skeleton is a thousandth as stiff as its liquid."""
+
+HELD: dict[str, Any] = {"law": "herschel_bulkley", "yield_stress_Pa": 0.0, "consistency_Pa_s": 1e-3}
+"""Water with its viscosity, so that a bed can hold it: the cell beside the bed then stands for the boundary layer."""
+
+NO_SLIP = 10.0
+"""Friction of a bed on which nothing slips."""
 
 MOST_SHIFT = 0.2
 """By how much in t* the clocks of experiment and simulation may differ: a gate takes time to go."""
@@ -61,10 +70,17 @@ class Setup:
     wall: bool = False
     """A wall stands at the end of the bed."""
     ceiling: float | None = None
+    gate: float | None = None
+    """Speed over √(g H) at which a gate is lifted; None: it is gone at once."""
+    held: bool = False
+    """The bed holds the water that touches it, which has the viscosity of water; false: it is smooth."""
 
 
 WALL = Setup(width=2.0, bed=1.61 / 0.3, end=7.5, wall=True, ceiling=2.0)
 """Lobovský's tank at H = 0.3 m. Buchner's has the same proportions, apart from its ceiling."""
+
+WALL_WITH_GATE = replace(WALL, gate=3.46 / math.sqrt(9.81 * 0.3), held=True)
+"""The gate's median speed at H = 0.3 m is 3.46 m/s."""
 
 SQUARE = Setup(width=1.0, bed=6.0, end=3.3)
 TALL = Setup(width=0.5, bed=4.0, end=1.7)
@@ -117,11 +133,13 @@ def watch(setup: Setup, cells: int, gauges: Sequence[float] = ()) -> Watched:
             "undrained",
             end_time=setup.end * unit,
             lateral=1.0,
-            soil=WATER,
+            soil=_soil(setup),
+            ground=NO_SLIP if setup.held else 0.0,
             barrier=fixed({"kind": "wall"}) if setup.wall else None,
             spacing_m=spacing,
             domain=domain,
-        )
+        ),
+        bodies=_gate(setup, spacing),
     )
     times = np.arange(1, round(setup.end / RECORD) + 1) * RECORD
     edges = np.zeros(1) if simulation.slots is None else simulation.slots.face.heights
@@ -139,6 +157,24 @@ def watch(setup: Setup, cells: int, gauges: Sequence[float] = ()) -> Watched:
         loads.append(taken / (now.time - before.time) / (DENSITY * G * DEPTH**2))
         before = now
     return Watched(cells, times, np.array(fronts), np.array(levels), edges / DEPTH, np.array(loads))
+
+
+def _soil(setup: Setup) -> dict[str, Any]:
+    if not setup.held:
+        return WATER
+    return {name: value for name, value in WATER.items() if name != "friction_angle_deg"} | HELD
+
+
+def _gate(setup: Setup, spacing: float) -> list[Body]:
+    """A smooth plate two cells thick before the column, which comes to its speed within a hundredth of t*."""
+    if setup.gate is None:
+        return []
+    left, top, unit = (setup.width - setup.bed) * DEPTH, 2.0 * DEPTH, math.sqrt(DEPTH / G)
+    right = left + 2.0 * spacing
+    outline = Outline([[left, 0.0], [right, 0.0], [right, top], [left, top]])
+    speed = setup.gate * math.sqrt(G * DEPTH)
+    motion = Driven((0.0, 0.01 * unit, setup.end * unit), ((0.0, 0.0), (0.0, speed), (0.0, speed)))
+    return [Body("gate", outline, motion=motion)]
 
 
 # -- clocks ------------------------------------------------------------------------------------------------------
