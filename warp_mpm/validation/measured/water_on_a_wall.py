@@ -340,9 +340,7 @@ def _fronts_and_levels(ladder: Ladder, runs: list[Watched], setup: Setup, given:
             rms(at_times(run, run.front, FRONT[:, 0], shift) - FRONT[:, 1])
             for run, shift in zip(runs, shifts, strict=True)
         ],
-        lambda ours: at_most(
-            "front, rms over nine times", "of H", ours, 0.05, percent=True, remark=REASONS[setup]["front"]
-        ),
+        lambda ours: at_most("front, rms over nine times", "of H", ours, 0.05, percent=True, remark=reasons["front"]),
     )
     ladder.add(
         [_front_speed(run) for run in runs],
@@ -363,7 +361,7 @@ def _fronts_and_levels(ladder: Ladder, runs: list[Watched], setup: Setup, given:
                 ours,
                 0.05,
                 percent=True,
-                remark=REASONS[setup]["level"],
+                remark=reasons["level"],
             ),
         )
         ladder.points += [
