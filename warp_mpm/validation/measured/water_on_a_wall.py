@@ -87,11 +87,13 @@ MEANS = {
 IMPULSES = {"z = 3 mm": 4.014, "z = 15 mm": 3.834, "z = 30 mm": 3.420, "z = 80 mm": 2.317}
 """∫ p* dt* until 7.15."""
 
-FILTERED_PEAKS = {"z = 3 mm": 2.201, "z = 15 mm": 1.878, "z = 30 mm": 1.517, "z = 80 mm": 0.747}
-"""Greatest mean over 0.1 t* of the typical event."""
+FILTERED_PEAKS = {"z = 3 mm": 2.201, "z = 15 mm": 1.878, "z = 30 mm": 1.517, "z = 80 mm": 0.589}
+"""Greatest mean over 0.1 t* of the typical event before `IMPACT_END`."""
 
 IMPULSE_END = 7.15
 FILTER = 0.1
+IMPACT_END = 5.0
+"""In t*; what is greater later is a wave that falls back."""
 
 FRONT = np.array([[0.25, 0.170], [0.5, 0.406], [0.75, 0.624], [1.0, 0.907], [1.25, 1.237], [1.5, 1.595],
                   [1.75, 1.964], [2.0, 2.366], [2.25, 2.789]])  # fmt: skip
@@ -126,8 +128,8 @@ REASONS = {
         "impulse": "the smooth bed lets the water arrive 15 % too fast, and it turns up the wall in a thin jet with "
         "too much pressure below and too little above, where the experiment has the pressure of standing water from "
         "t* = 3 on; " + NUMERICS + "; with the gate and a bed that holds the water, in the next case, most of it goes",
-        "peak": "3 mm: the filter takes as much from the experiment, whose typical event falls to 2.20; 80 mm: the "
-        "peak is not that of the impact but of the wave that falls back at t* = 6.6, which no grid makes the same",
+        "peak": "3 mm: the filter takes as much from the experiment, whose typical event falls to 2.20; 30 and 80 mm: "
+        "the thin jet presses below them",
         "level": "until t* = 5 all levels are within some percent of H; what falls back from the wall afterwards is "
         "gathered in a smaller and faster wave than the experiment's",
         "front": "it starts too slowly, as no water escapes beneath a gate, and then runs 15 % too fast on a bed "
@@ -137,7 +139,8 @@ REASONS = {
         "impulse": "what is missing is missing after t* = 4.5, when water falls back; with the spacing the layer that "
         "the bed holds gets thinner, and the lower sensors drift",
         "peak": "the filter takes 13 % from the experiment's own peak at 3 mm; at 15 and 30 mm a percent is missing, "
-        "as cells of 5 mm stand for sensors of 4.2 mm; at 80 mm it is the falling wave of t* = 6.6",
+        "as cells of 5 mm stand for sensors of 4.2 mm; at 80 mm the typical event's own filtered peak, 0.59, is below "
+        "the band too, and ours is as great",
         "level": "until t* = 5 all levels are within some percent of H; what falls back from the wall afterwards is "
         "gathered in a smaller wave than the experiment's, whose tank holds air",
         "front": "",
@@ -164,7 +167,8 @@ def lobovsky(given: Given) -> Outcome:
     Greatest p* filtered over 0.1 t* within the 2.5 to 97.5 % band of the peaks of 100 repeats. The peaks of the
     experiment are not filtered; a simulated peak must be, for a sharper one is a matter of the grid. At z = 3 mm this
     asks for more than the experiment has, whose typical event falls from 2.52 to 2.20 under the same filter: a miss
-    there is one of the measure. The filtered peak of that event stands beside.
+    there is one of the measure. The filtered peak of that event stands beside. (Made stricter after the first run: of
+    the time before t* = 5, as at 30 mm a wave that fell back at 6.6 had passed for the impact.)
 
     Front at nine times within 5 % of H (root mean square), and levels at four gauges, means around t* = 1 to 7, within
     5 % of H each (root mean square): two repeats of the levels differ by 1 to 3 % of H.
@@ -240,14 +244,14 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
     for name, band in PEAKS.items():
         median, low, high = (value * MBAR for value in band)
         ladder.add(
-            [float(filtered(trace, FILTER).max()) for trace in traces[name]],
+            [_peak(run, trace) for run, trace in zip(runs, traces[name], strict=True)],
             lambda ours, name=name, low=low, high=high: within(
                 f"{name}: greatest p*, mean over 0.1 t*", "-", ours, low, high, remark=reasons["peak"]
             ),
             measured=(median, low, high),
         )
         ladder.add(
-            [float(filtered(trace, FILTER).max()) for trace in traces[name]],
+            [_peak(run, trace) for run, trace in zip(runs, traces[name], strict=True)],
             lambda ours, name=name: reported(
                 f"{name}: the same beside the typical event's under the same filter",
                 "-",
@@ -277,6 +281,11 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
             "with the greatest mean over that depth and 0.1 t*."
         ],
     )
+
+
+def _peak(run: Watched, trace: Array) -> float:
+    """Greatest filtered p* of the impact."""
+    return float(filtered(trace, FILTER)[run.time < IMPACT_END].max())
 
 
 def _first(time: Array, values: Array) -> float:
