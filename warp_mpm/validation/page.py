@@ -178,6 +178,9 @@ def _worst(outcome: Outcome) -> str:
     return f"{max(shares):.2g}" if shares else ""
 
 
+MOST_LABELS = 6
+"""A longer legend stands below its panel, where it hides nothing."""
+
 # -- plots -------------------------------------------------------------------------------------------------------
 
 
@@ -185,13 +188,18 @@ def drawn(panels: Sequence[Panel]) -> Figure:
     """All panels of a case, two in a row."""
     columns = min(len(panels), 2)
     rows = math.ceil(len(panels) / columns)
-    figure = Figure(figsize=(5.2 * columns, 3.3 * rows), layout="constrained")
+    height = 4.4 if any(len(_labels(panel)) > MOST_LABELS for panel in panels) else 3.3
+    figure = Figure(figsize=(5.2 * columns, height * rows), layout="constrained")
     axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for panel, place in zip(panels, axes, strict=False):
         _draw(place, panel)
     for place in axes[len(panels) :]:
         place.set_visible(False)
     return figure
+
+
+def _labels(panel: Panel) -> list[str]:
+    return [drawn.label for drawn in (*panel.curves, *panel.bands) if drawn.label]
 
 
 def _draw(place: Axes, panel: Panel) -> None:
@@ -216,7 +224,9 @@ def _draw(place: Axes, panel: Panel) -> None:
     if panel.x_range is not None:
         place.set_xlim(*panel.x_range)
     grid(place)
-    if any(drawn.label for drawn in (*panel.curves, *panel.bands)):
+    if len(_labels(panel)) > MOST_LABELS:
+        place.legend(fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.22))
+    elif _labels(panel):
         place.legend(fontsize=8)
 
 
