@@ -199,7 +199,8 @@ def drawn(panels: Sequence[Panel]) -> Figure:
 
 
 def _labels(panel: Panel) -> list[str]:
-    return [drawn.label for drawn in (*panel.curves, *panel.bands) if drawn.label]
+    labels = [*(curve.label for curve in panel.curves), *(band.label for band in panel.bands)]
+    return [label for label in labels if label]
 
 
 def _draw(place: Axes, panel: Panel) -> None:

@@ -135,12 +135,12 @@ def run_down(setting: Setting, spacing: float) -> Passed:
     simulation = Simulation(made)
     times = np.arange(1, round(END / RECORD) + 1) * RECORD
     rows = []
-    for time in times:
-        simulation.advance(float(time))
+    for time in times.tolist():
+        simulation.advance(time)
         points = simulation.points(["position", "volume", "effective_stress", "pore_pressure"])
         rows.append([_at_gauge(points, place, spacing) for place in PLACES])
     depth, stress, pressure = np.array(rows).transpose(2, 0, 1)
-    return Passed(times, depth, stress, pressure)
+    return Passed(times.astype(np.float64), depth, stress, pressure)
 
 
 def _at_gauge(points: Mapping[str, Array], place: float, spacing: float) -> tuple[float, float, float]:
@@ -227,51 +227,45 @@ def _judge(ladder: Ladder, runs: Sequence[Passed]) -> None:
     for name in best["SG"]:
         shares = {mix: float(np.mean(hits[name])) for mix, hits in best.items()}
         told = ", ".join(f"{mix} {sum(hits[name])} of {len(hits[name])}" for mix, hits in best.items())
-        values = [max(float(np.mean(_hits(run, mix)[name])) for mix in best) for run in runs]
-        ladder.add(
-            values,
-            lambda ours, name=name, told=told, shares=shares: holds(
-                f"{name}: share of the times behind the front within one standard deviation",
-                "-",
-                ours,
-                max(shares.values()) > 0.5,
-                reference=f"> 0.5; {told}",
-                remark=SHORT,
-            ),
+        ours = [max(float(np.mean(_hits(run, mix)[name])) for mix in best) for run in runs]
+        check = holds(
+            f"{name}: share of the times behind the front within one standard deviation",
+            "-",
+            ours[-1],
+            max(shares.values()) > 0.5,
+            reference=f"> 0.5; {told}",
+            remark=SHORT,
         )
+        ladder.add(check, ours)
     for gauge, place in enumerate(PLACES):
         low, high = sorted(ARRIVALS[mix, place] for mix in ("SG", "SGM"))
         middle = 0.5 * (low + high)
         ours = [run.arrival(gauge) for run in runs]
         if place == PLACES[0]:
-            ladder.add(
-                ours,
-                lambda value, low=low, high=high: holds(
-                    "arrival at 32 m", "s", value, 0.85 * low <= value <= 1.15 * high,
-                    reference=f"{0.85 * low:.3g} … {1.15 * high:.3g}", remark=SHORT,
-                ),
-                measured=(middle, low, high),
-            )  # fmt: skip
-        else:
-            ladder.add(
-                ours,
-                lambda value, middle=middle, place=place: reported(
-                    f"arrival at {place:g} m", "s", value, reference=middle
-                ),
-                measured=(middle, low, high),
+            earliest, latest = 0.85 * low, 1.15 * high
+            check = holds(
+                f"arrival at {place:g} m",
+                "s",
+                ours[-1],
+                earliest <= ours[-1] <= latest,
+                reference=f"{earliest:.3g} … {latest:.3g}",
+                remark=SHORT,
             )
-        for name, unit, theirs, values, later in (
+        else:
+            check = reported(f"arrival at {place:g} m", "s", ours[-1], reference=middle)
+        ladder.add(check, ours, measured=(middle, low, high))
+        for name, unit, theirs, seen, later in (
             ("depth", "m", DEPTHS, [run.depth for run in runs], LATER),
             ("stress on the bed", "kPa", STRESSES, [run.stress / 1e3 for run in runs], LATER[1:]),
             ("pore pressure on the bed", "kPa", PRESSURES, [run.pressure / 1e3 for run in runs], LATER[1:]),
         ):
-            for k, time in enumerate(later):
+            for k, after in enumerate(later):
                 mean, deviation = theirs["SG", place][k]
-                found = [run.behind(value, gauge, time) for run, value in zip(runs, values, strict=True)]
+                found = [run.behind(values, gauge, after) for run, values in zip(runs, seen, strict=True)]
                 if np.isfinite(found).all():
                     ladder.points.append(
                         simulated(
-                            f"{name} at {place:g} m, {time:g} s behind the front [{unit}]",
+                            f"{name} at {place:g} m, {after:g} s behind the front [{unit}]",
                             mean,
                             found,
                             band=(max(mean - deviation, 0.1 * mean), mean + deviation),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mpm.validation.case import Array, Check, Curve, Outcome, Panel, at_most, reference
+from warp_mpm.validation.case import Array, Curve, Outcome, Panel, at_most, reference
 from warp_mpm.validation.measured.given import Given, Ladder, simulated
 from warp_mpm.validation.measured.water import (
     MOST_SHIFT,
@@ -121,14 +121,9 @@ def _judge(ladder: Ladder, series: Series, runs: list[Watched], given: Given) ->
     shifts = [best_shift([(run, _place(setup, run), times, places)]) for run in runs]
     ours = [at_times(run, _place(setup, run), times, shift) for run, shift in zip(runs, shifts, strict=True)]
 
-    def off(value: float) -> Check:
-        return at_most(f"{series.title}: front, rms", "of H", value, 0.05, percent=True, remark=SHORT)
-
-    ladder.add([setup.width * rms(found - places) for found in ours], off)
-    ladder.add(
-        shifts,
-        lambda value: at_most(f"{series.title}: shift of the clock", "t √(g/H)", value, MOST_SHIFT),
-    )
+    off = [setup.width * rms(found - places) for found in ours]
+    ladder.add(at_most(f"{series.title}: front, rms", "of H", off[-1], 0.05, percent=True, remark=SHORT), off)
+    ladder.add(at_most(f"{series.title}: shift of the clock", "t √(g/H)", shifts[-1], MOST_SHIFT), shifts)
     ladder.points += [
         simulated(f"{series.title}, T = {series.times[k]:g}", place, [float(found[k]) for found in ours])
         for k, place in enumerate(series.places)

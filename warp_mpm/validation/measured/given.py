@@ -74,19 +74,18 @@ class Ladder:
 
     def add(
         self,
+        check: Check,
         values: Sequence[float],
-        judge: Callable[[float], Check],
         *,
         measured: tuple[float, float, float] | None = None,
     ) -> None:
         """A figure.
 
         Args:
+            check: of the finest spacing.
             values: at each spacing.
-            judge: makes the check of the finest one.
             measured: what was measured and the ends of its band, for the picture of all figures; None: not in it.
         """
-        check = judge(values[-1])
         self.checks.append(check)
         self._rows.append((check.quantity, check.unit, check.reference, *(number(value) for value in values)))
         if measured is not None and np.isfinite(values).all():

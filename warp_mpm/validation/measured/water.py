@@ -156,7 +156,7 @@ def watch(setup: Setup, cells: int, gauges: Sequence[float] = ()) -> Watched:
         taken = (now.taken - before.taken).reshape(-1, at.SLOT_SIZE)[: len(edges) - 1, at.SLOT_NORMAL]
         loads.append(taken / (now.time - before.time) / (DENSITY * G * DEPTH**2))
         before = now
-    return Watched(cells, times, np.array(fronts), np.array(levels), edges / DEPTH, np.array(loads))
+    return Watched(cells, times.astype(np.float64), np.array(fronts), np.array(levels), edges / DEPTH, np.array(loads))
 
 
 def _soil(setup: Setup) -> dict[str, Any]:

@@ -197,20 +197,20 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
         name: [_first(run.time, trace) for run, trace in zip(runs, own, strict=True)] for name, own in traces.items()
     }
     shifts = [float(np.mean([ARRIVALS[name] - arrivals[name][k] for name in HEIGHTS])) for k in range(len(runs))]
-    ladder.add(shifts, lambda ours: at_most("shift of the clock of the pressures", "t*", ours, MOST_SHIFT))
+    ladder.add(at_most("shift of the clock of the pressures", "t*", shifts[-1], MOST_SHIFT), shifts)
     clipped = [float(np.clip(shift, -MOST_SHIFT, MOST_SHIFT)) for shift in shifts]
     for name, theirs in ARRIVALS.items():
+        ours = [arrival + shift for arrival, shift in zip(arrivals[name], clipped, strict=True)]
         ladder.add(
-            [arrival + shift for arrival, shift in zip(arrivals[name], clipped, strict=True)],
-            lambda ours, name=name, theirs=theirs: _near(f"{name}: arrival", "t*", ours, theirs, 0.2),
+            _near(f"{name}: arrival", "t*", ours[-1], theirs, 0.2),
+            ours,
             measured=(theirs, theirs - RECORD, theirs + RECORD),
         )
     for name, theirs in IMPULSES.items():
+        ours = [_impulse(run, trace, shift) for run, trace, shift in zip(runs, traces[name], clipped, strict=True)]
         ladder.add(
-            [_impulse(run, trace, shift) for run, trace, shift in zip(runs, traces[name], clipped, strict=True)],
-            lambda ours, name=name, theirs=theirs: compared(
-                f"{name}: ∫ p* dt* until 7.15", "-", ours, theirs, 0.1, remark=reasons["impulse"]
-            ),
+            compared(f"{name}: ∫ p* dt* until 7.15", "-", ours[-1], theirs, 0.1, remark=reasons["impulse"]),
+            ours,
             measured=(theirs, theirs, theirs),
         )
     rows = []
@@ -224,16 +224,17 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
         off = ours_all / np.array(theirs_all) - 1.0
         worst = int(np.argmax(np.abs(off[-1])))
         within_limit = int((np.abs(off[-1]) <= 0.15).sum())
+        ours = [float(value) for value in off[:, worst]]
         ladder.add(
-            [float(value) for value in off[:, worst]],
-            lambda ours, name=name, worst=worst, count=within_limit: at_most(
-                f"{name}: window means, worst of eight ({count} within), from t* = {WINDOWS[worst]:g}",
+            at_most(
+                f"{name}: window means, worst of eight ({within_limit} within), from t* = {WINDOWS[worst]:g}",
                 "of it",
-                ours,
+                ours[-1],
                 0.15,
                 percent=True,
                 remark=reasons["impulse"],
             ),
+            ours,
         )
         ladder.points += [
             simulated(f"{name}, from t* = {begin:g}", theirs, ours, by=by)
@@ -243,21 +244,20 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
         rows.append((f"{name}, ours", *(number(value) for value in ours_all[-1])))
     for name, band in PEAKS.items():
         median, low, high = (value * MBAR for value in band)
+        ours = [_peak(run, trace) for run, trace in zip(runs, traces[name], strict=True)]
         ladder.add(
-            [_peak(run, trace) for run, trace in zip(runs, traces[name], strict=True)],
-            lambda ours, name=name, low=low, high=high: within(
-                f"{name}: greatest p*, mean over 0.1 t*", "-", ours, low, high, remark=reasons["peak"]
-            ),
+            within(f"{name}: greatest p*, mean over 0.1 t*", "-", ours[-1], low, high, remark=reasons["peak"]),
+            ours,
             measured=(median, low, high),
         )
         ladder.add(
-            [_peak(run, trace) for run, trace in zip(runs, traces[name], strict=True)],
-            lambda ours, name=name: reported(
+            reported(
                 f"{name}: the same beside the typical event's under the same filter",
                 "-",
-                ours,
+                ours[-1],
                 reference=FILTERED_PEAKS[name],
             ),
+            ours,
         )
     panels = [_pressure_panel(name, runs, traces[name], clipped, given) for name in HEIGHTS]
     front_panels = _fronts_and_levels(ladder, runs, setup, given)
@@ -341,19 +341,18 @@ def _fronts_and_levels(ladder: Ladder, runs: list[Watched], setup: Setup, given:
         for run in runs
     ]
     ladder.add(
-        shifts,
-        lambda ours: at_most("shift of the clock of front and levels, the one that fits best", "t*", ours, MOST_SHIFT),
+        at_most("shift of the clock of front and levels, the one that fits best", "t*", shifts[-1], MOST_SHIFT), shifts
     )
+    ours = [
+        rms(at_times(run, run.front, FRONT[:, 0], shift) - FRONT[:, 1]) for run, shift in zip(runs, shifts, strict=True)
+    ]
     ladder.add(
-        [
-            rms(at_times(run, run.front, FRONT[:, 0], shift) - FRONT[:, 1])
-            for run, shift in zip(runs, shifts, strict=True)
-        ],
-        lambda ours: at_most("front, rms over nine times", "of H", ours, 0.05, percent=True, remark=reasons["front"]),
+        at_most("front, rms over nine times", "of H", ours[-1], 0.05, percent=True, remark=reasons["front"]), ours
     )
+    ours = [_front_speed(run) for run in runs]
     ladder.add(
-        [_front_speed(run) for run in runs],
-        lambda ours: reported("slope of the front, t* from 1.2 to 2.2", "-", ours, reference=FRONT_SPEED),
+        reported("slope of the front, t* from 1.2 to 2.2", "-", ours[-1], reference=FRONT_SPEED),
+        ours,
         measured=(FRONT_SPEED, FRONT_SPEED, FRONT_SPEED),
     )
     for k, (name, place) in enumerate(GAUGES.items()):
@@ -362,19 +361,20 @@ def _fronts_and_levels(ladder: Ladder, runs: list[Watched], setup: Setup, given:
             at_times(run, _smooth_levels(run)[:, k], LEVEL_TIMES, shift)
             for run, shift in zip(runs, shifts, strict=True)
         ]
+        ours = [rms(levels - theirs) for levels in ours_all]
         ladder.add(
-            [rms(ours - theirs) for ours in ours_all],
-            lambda ours, name=name, place=place: at_most(
+            at_most(
                 f"level at x = {place:g} m ({name}), rms",
                 "of H",
-                ours,
+                ours[-1],
                 0.05,
                 percent=True,
                 remark=reasons["level"],
             ),
+            ours,
         )
         ladder.points += [
-            simulated(f"{name}, t* = {time:g}", level, [float(ours[i]) for ours in ours_all], by=ladder.by)
+            simulated(f"{name}, t* = {time:g}", level, [float(levels[i]) for levels in ours_all], by=ladder.by)
             for i, (time, level) in enumerate(zip(LEVEL_TIMES, LEVELS[name], strict=True))
             if level > 0.05
         ]
@@ -433,10 +433,10 @@ def _formulas(ladder: Ladder, runs: list[Watched]) -> list[Point]:
     """The greatest mean pressure over the depth that arrives: simulated, and by formulas."""
     ours = [float(filtered(run.pressure(0.5 * ARRIVING, ARRIVING), FILTER).max()) for run in runs]
     ladder.add(
-        ours,
-        lambda value: reported(
-            f"greatest mean p* over the lowest {ARRIVING:g} H and 0.1 t*", "-", value, reference=ARRIVING_PRESSURE
+        reported(
+            f"greatest mean p* over the lowest {ARRIVING:g} H and 0.1 t*", "-", ours[-1], reference=ARRIVING_PRESSURE
         ),
+        ours,
         measured=(ARRIVING_PRESSURE, ARRIVING_PRESSURE, ARRIVING_PRESSURE),
     )
     celerity = math.sqrt(9.81 * DEPTH)
@@ -487,36 +487,41 @@ def buchner(given: Given) -> Outcome:
     runs = _runs(given, WALL)
     ladder = Ladder([f"H/{run.cells}" for run in runs])
     lower, upper = ([run.pressure(SENSORS[name], DIAMETER) for run in runs] for name in ("P1", "P2"))
+    ours = [mean_between(run.time, trace, *PLATEAU) for run, trace in zip(runs, lower, strict=True)]
     ladder.add(
-        [mean_between(run.time, trace, *PLATEAU) for run, trace in zip(runs, lower, strict=True)],
-        lambda ours: compared("P1: mean p* for 3.3 < t* < 5.3", "-", ours, PLATEAU_MEAN, 0.1, remark=BUCHNER_SHORT),
+        compared("P1: mean p* for 3.3 < t* < 5.3", "-", ours[-1], PLATEAU_MEAN, 0.1, remark=BUCHNER_SHORT),
+        ours,
         measured=(PLATEAU_MEAN, PLATEAU_MEAN - DIGITISED, PLATEAU_MEAN + DIGITISED),
     )
+    ours = [float(trace[run.time < FIRST_PEAK_UNTIL].max()) for run, trace in zip(runs, lower, strict=True)]
     ladder.add(
-        [float(trace[run.time < FIRST_PEAK_UNTIL].max()) for run, trace in zip(runs, lower, strict=True)],
-        lambda ours: within(
+        within(
             "P1: first peak",
             "-",
-            ours,
+            ours[-1],
             0.9 * FIRST_PEAK - DIGITISED,
             1.1 * FIRST_PEAK + DIGITISED,
             remark=BUCHNER_SHORT,
         ),
+        ours,
         measured=(FIRST_PEAK, FIRST_PEAK - DIGITISED, FIRST_PEAK + DIGITISED),
     )
+    ours = [_first(run.time, trace) for run, trace in zip(runs, lower, strict=True)]
     ladder.add(
-        [_first(run.time, trace) for run, trace in zip(runs, lower, strict=True)],
-        lambda ours: reported("P1: arrival, p* > 0.1", "t*", ours, reference=P1_ARRIVAL),
+        reported("P1: arrival, p* > 0.1", "t*", ours[-1], reference=P1_ARRIVAL),
+        ours,
         measured=(P1_ARRIVAL, P1_ARRIVAL - DIGITISED, P1_ARRIVAL + DIGITISED),
     )
+    ours = [float(filtered(trace, FILTER)[run.time > PLATEAU[1]].max()) for run, trace in zip(runs, lower, strict=True)]
     ladder.add(
-        [float(filtered(trace, FILTER)[run.time > PLATEAU[1]].max()) for run, trace in zip(runs, lower, strict=True)],
-        lambda ours: reported("P1: second peak, mean over 0.1 t*", "-", ours, reference=0.5 * sum(SECOND_PEAK)),
+        reported("P1: second peak, mean over 0.1 t*", "-", ours[-1], reference=0.5 * sum(SECOND_PEAK)),
+        ours,
         measured=(0.5 * sum(SECOND_PEAK), *SECOND_PEAK),
     )
+    ours = [float(filtered(trace, FILTER).max()) for trace in upper]
     ladder.add(
-        [float(filtered(trace, FILTER).max()) for trace in upper],
-        lambda ours: reported("P2: greatest p*, mean over 0.1 t*", "-", ours, reference=P2_PEAK),
+        reported("P2: greatest p*, mean over 0.1 t*", "-", ours[-1], reference=P2_PEAK),
+        ours,
         measured=(P2_PEAK, P2_PEAK - DIGITISED, P2_PEAK + DIGITISED),
     )
     table = given.tables.get("buchner2002_wall_pressure")
