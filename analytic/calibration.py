@@ -228,6 +228,60 @@ def calibrate(
     )
 
 
+WIDEST_WINDOW = 0.5
+"""Longest moving mean [s] that is looked at for a given lambda."""
+
+
+@dataclass(frozen=True)
+class WindowOf:
+    """The moving mean that a given lambda would need by the rule of the peak."""
+
+    geometry_change: float
+    """lambda [-]."""
+    peak_force: float
+    """That belongs to it [N/m]."""
+    window: float | None
+    """Length of the longest moving mean whose peak is as great [s]; ``None`` where none is, nor a single record."""
+    largest_force: float
+    """Greatest record of the history [N/m]."""
+
+    @property
+    def words(self) -> str:
+        """One sentence without capital and stop."""
+        asked = f"λ = {self.geometry_change:g} needs a peak of {self.peak_force / 1e3:.3g} kN/m"
+        if self.window is None:
+            return (
+                f"{asked}, and no moving mean reaches that: the greatest single record is "
+                f"{self.largest_force / 1e3:.3g} kN/m"
+            )
+        if self.window == 0.0:
+            return f"{asked}, which single records alone reach, and no moving mean"
+        longest = "or more " if self.window >= WIDEST_WINDOW else ""
+        return f"{asked}, which is that of a moving mean over {self.window:.2g} s {longest}".rstrip()
+
+
+def window_of(geometry_change: float, time: Array, force: Array, scene: Scene) -> WindowOf:
+    """The moving mean whose peak gives a lambda [-] by Eqs. (5) and (7).
+
+    The peak of the mean falls as it gets longer, so that each lambda has one window, or none.
+
+    Parameters
+    ----------
+    geometry_change: lambda.
+    time, force: as in ``measure``.
+    scene: masses, length and speed of the flow, and the barrier.
+    """
+    time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
+    needed = 0.75 * _reduced_mass(scene) * scene.speed**2 / (geometry_change * scene.flow_length)
+    largest = float(force.max())
+    shortest = float(np.diff(time).min())
+    window: float | None = None if largest < needed else 0.0
+    for length in np.geomspace(shortest, max(WIDEST_WINDOW, shortest), 200):
+        if float(moving_mean(time, force, float(length)).max()) >= needed:
+            window = float(length)
+    return WindowOf(geometry_change, needed, window, largest)
+
+
 def _reduced_mass(scene: Scene) -> float:
     return (
         scene.flow_mass if scene.barrier_mass is None else scene.flow_mass / (1 + scene.flow_mass / scene.barrier_mass)

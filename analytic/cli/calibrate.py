@@ -31,17 +31,19 @@ def calibrate(
     """Fit λ (or s1max) and τ to recorded forces, by the paper's rule and by least squares.
 
     The peak rule takes the peak of the filtered force and its time; least squares takes the triangle nearest to F(t)
-    from arrival to the end of the impact. Misfits are root mean squares over the largest recorded value.
+    from arrival to the end of the impact. Misfits are root mean squares over the largest recorded value. A note says
+    which moving mean the paper's λ would need.
     """
     with refusals():
         check_plot(plot)
-        from analytic.calibration import RULES, misfit, warnings
+        from analytic.calibration import RULES, misfit, warnings, window_of
 
         rows: list[list[str]] = []
         content: list[dict[str, Any]] = []
         drawn = []
         rule_of_filtering = ""
         told: list[str] = []
+        needs: list[str] = []
         for path in records:
             name, series, scene = load(path, scenario)
             kappa = _vertical_load_ratio(series, scene, filter_window)
@@ -49,6 +51,8 @@ def calibrate(
             found_wanting = [f"{warning}." for warning in warnings(series, fits[0].measured)]
             told += [f"{name}: {note}" for note in [*scene.notes, *found_wanting]]
             drawn.append((f"{name}: {scene.title}", series, fits))
+            needed = window_of(scene.paper_geometry_change, series["time"], series["impact_force_x"], scene)
+            needs.append(f"{name}: the paper's {needed.words}.")
             for fit in fits:
                 found = misfit(fit.impact, series, fit.measured)
                 misfits = [found.force, found.flow_kinetic_energy, found.barrier_velocity, found.barrier_displacement]
@@ -63,7 +67,14 @@ def calibrate(
                         *("–" if value is None else f"{100 * value:.1f} %" for value in misfits),
                     ]
                 )
-                content.append(_as_dict(path, fit, kappa, found) | {"notes": [*scene.notes, *found_wanting]})
+                paper = {
+                    "geometry_change": needed.geometry_change,
+                    "peak_force": needed.peak_force,
+                    "filter_window": needed.window,
+                    "largest_force": needed.largest_force,
+                }
+                told_of_it = {"paper": paper, "notes": [*scene.notes, *found_wanting]}
+                content.append(_as_dict(path, fit, kappa, found) | told_of_it)
             rule_of_filtering = fits[0].measured.filter_rule
         if as_json:
             print_json(content)
@@ -73,7 +84,7 @@ def calibrate(
                 notes.append("*: beyond s1max = L or τ = 1; the misfits are those of the nearest values within.")
             if any(entry["measured"]["at_least"] for entry in content):
                 notes.append("Where the impact is not over, least squares and κ are of the part that was recorded.")
-            notes += told
+            notes += [*needs, *told]
             header = ["run", "rule", "s1max [m]", "λ", "τ", "κ", "misfit F", "E_k1", "v2", "Δx"]
             print_table("Calibration of the closed form", header, rows, notes)
         if plot is not None:

@@ -8,7 +8,7 @@ import pytest
 
 from analytic import calibration
 from analytic.arrays import trajectory
-from analytic.calibration import CalibrationError, calibrate, measure, misfit
+from analytic.calibration import WIDEST_WINDOW, CalibrationError, calibrate, measure, misfit, window_of
 from analytic.force_record import FILTER_WINDOW, SETTLED_SHARE
 from analytic.impact import Impact
 from analytic.scene import Scene
@@ -79,6 +79,30 @@ def test_a_shorter_filter_finds_a_higher_peak_and_the_rule_is_stated() -> None:
     found = [calibrate(series["time"], series["impact_force_x"], SLIDING, filter_window=w) for w in (0.0, 0.05, 0.2)]
     assert found[0].geometry_change < found[1].geometry_change < found[2].geometry_change
     assert "moving mean over 0.2 s" in found[2].measured.filter_rule
+
+
+@pytest.mark.parametrize("window", [0.02, 0.1, 0.3])
+def test_the_window_that_a_lambda_needs_is_the_one_that_gives_it(window: float) -> None:
+    series = record(FIXED.impact(geometry_change=0.5, rise_ratio=0.3, arrival_time=0.3))
+    time, force = series["time"], series["impact_force_x"]
+    asked = calibrate(time, force, FIXED, filter_window=window).geometry_change
+    found = window_of(asked, time, force, FIXED)
+    # Windows are looked at in steps of 2 %, and samples of 5 ms make the peak's fall one of steps.
+    assert found.window == pytest.approx(window, rel=0.05, abs=0.005)
+    assert f"a moving mean over {found.window:.2g} s" in found.words
+    again = calibrate(time, force, FIXED, filter_window=found.window)
+    assert again.measured.peak_force == pytest.approx(found.peak_force, rel=0.005)
+
+
+def test_a_lambda_that_no_window_gives_is_said() -> None:
+    series = record(FIXED.impact(geometry_change=0.9, rise_ratio=0.3, arrival_time=0.3))
+    time, force = series["time"], series["impact_force_x"]
+    none = window_of(0.72, time, force, FIXED)
+    assert none.window is None
+    assert "needs a peak of 562 kN/m, and no moving mean reaches that" in none.words
+    wide = window_of(5.0, time, force, FIXED)
+    assert wide.window == pytest.approx(WIDEST_WINDOW)
+    assert wide.words.endswith("over 0.5 s or more")
 
 
 def test_misfit_of_the_right_model_is_nil_and_of_a_wrong_one_is_not() -> None:

@@ -1,6 +1,7 @@
 """The command line as a user meets it: numbers, tables, pictures, sentences and exit codes."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -242,6 +243,11 @@ def test_calibrate_prints_a_table(run_folder: Path) -> None:
     result = call("calibrate", str(run_folder), "--filter-window", "0.1")
     assert "Filter: peak of the moving mean over 0.1 s" in result.stdout
     assert "least squares" in result.stdout
+    assert re.search(r"the paper's λ = 0\.41 needs a peak of \d+ kN/m, and no moving mean reaches that", result.stdout)
+    paper = answer("calibrate", str(run_folder))[0]["paper"]
+    assert paper["geometry_change"] == 0.41
+    assert paper["filter_window"] is None
+    assert paper["largest_force"] < paper["peak_force"]
     assert refusal("calibrate", str(run_folder), "--filter-window", "-1").startswith(
         "--filter-window = -1 is not allowed"
     )

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.cli import app
-from warp_mpm.validation import catalogue
+from warp_mpm.validation import catalogue, paper_forces
 from warp_mpm.validation.case import (
     Case,
     Curve,
@@ -181,3 +181,33 @@ def test_the_pressure_residual_sees_noise_and_not_a_plane():
     noise = rng.normal(0.0, 1e3, len(position))
     left = pressure_residual(position, plane + noise, volume, 0.2)[inner]
     assert 0.5e3 < left.std() < 1e3
+
+
+# -- the paper's force, on stand-in runs -----------------------------------------------------------------------------
+
+
+def stand_in(level):
+    """A run of case 1 whose force rises to a level [N/m] within 0.1 s, and overshoots it by a tenth for 20 ms."""
+    time = np.arange(1301) * 1e-3
+    force = level * np.clip((time - 0.3) / 0.1, 0.0, 1.0)
+    force[500:520] *= 1.1
+    means = [paper_forces.moving_mean(time, force, window) for window in paper_forces.WINDOWS]
+    return paper_forces.Peaks(
+        np.array([mean.max() for mean in means]), np.full(5, 0.2), level, 1e5, {"time": time, "impact_force_x": force}
+    )
+
+
+@pytest.mark.parametrize(("level", "passed"), [(404e3, True), (500e3, False)])
+def test_the_papers_force_is_judged_by_its_sustained_level(monkeypatch, level, passed):
+    monkeypatch.setattr(paper_forces, "peaks_of", lambda name, spacing: stand_in(level))
+    outcome = paper_forces.forces(quick=True)
+    assert outcome.checks[0].passed is passed
+    lambdas = [check for check in outcome.checks if check.quantity.startswith("λ")]
+    assert [check.reference for check in lambdas] == ["0.72", "0.41"]
+    # 0.75 m v²/(F L) over 50 ms, of which 20 ms are a tenth higher.
+    assert lambdas[0].ours == pytest.approx(0.75 * 81000.0 * 100.0 / (1.04 * level) / 15.0, rel=0.01)
+    assert "needs a peak of 562 kN/m" in lambdas[0].remark
+    by_window = next(table for table in outcome.tables if table.title.startswith("λ and τ of case 1, fixed"))
+    assert [row[0] for row in by_window.rows] == ["1 ms", "5 ms", "20 ms", "50 ms", "100 ms"]
+    forces = next(table for table in outcome.tables if "greatest moving mean" in table.title)
+    assert len(forces.rows) == len(paper_forces.THEIRS) + 2

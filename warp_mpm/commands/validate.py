@@ -18,14 +18,26 @@ def validate(
         list[str] | None, typer.Option(metavar="NAME", help="Only this case; may be given again.", show_default=False)
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Coarser or shorter variants of most cases.")] = False,
+    measured: Annotated[
+        bool, typer.Option("--measured", help="The cases held against measurements, in place of known answers.")
+    ] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="With --measured: folder of measured curves, which are not shipped.", show_default=False
+        ),
+    ] = None,
+    finer: Annotated[
+        int, typer.Option(metavar="N", min=1, max=16, help="With --measured: divide every spacing by this.")
+    ] = 1,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and its plots.")] = Path(
         "runs/validation"
     ),
 ) -> None:
     """Run the cases whose answers are known, and write a page of ours beside the reference.
 
-    The folder then holds validation.md and, in validation/, a plot of each case. Every case has a limit; a number that
-    misses it stays on the page as short, with the reason.
+    The folder then holds validation.md and, in validation/, a plot of each case; with --measured measured.md and
+    measured/. Every case has a limit; a number that misses it stays on the page as short, with the reason.
 
     Exit codes: 0 all within their limits, 1 some fall short, 2 the input cannot be used, 130 interrupted; the page then
     holds the cases that ended.
@@ -36,8 +48,23 @@ def validate(
     from warp_mpm.validation import catalogue, page
 
     with refusals():
-        cases = catalogue.chosen(only, quick=quick)
-        (out / page.PICTURES).mkdir(parents=True, exist_ok=True)
+        if not measured and (data is not None or finer != 1):
+            option = "--data" if data is not None else "--finer"
+            raise ValueError(f"{option} needs --measured; known answers take none.")
+        if measured:
+            from warp_mpm.validation.measured.catalogue import measured_cases
+            from warp_mpm.validation.measured.given import Given
+            from warp_mpm.validation.measured.tables import Tables
+
+            tables = Tables(data)
+            cases = catalogue.named(measured_cases(Given(finer=finer, tables=tables)), only)
+            told = f"{len(tables.names)} tables of measured curves" if tables.names else "no tables of measured curves"
+            how = f"{'quick' if quick else 'full'} variants{f', spacings over {finer}' if finer > 1 else ''}, {told}"
+        else:
+            cases = catalogue.chosen(only, quick=quick)
+            how = "quick variants" if quick else "full variants"
+        kind = page.KINDS["measured" if measured else "known answers"]
+        (out / kind.name).mkdir(parents=True, exist_ok=True)
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 160
@@ -53,8 +80,9 @@ def validate(
         results.append(page.Result(case, outcome, time.perf_counter() - begin))
         console.print(f"{case.title}  ({results[-1].seconds:.1f} s)", style="bold")
         console.print(page.check_table(outcome))
+        first = page.everything([result.outcome for result in results]) if measured else None
         with refusals():
-            written = page.write(out, results, quick=quick, versions=_versions())
+            written = page.write(out, results, kind=kind, how=how, versions=_versions(), first=first)
     console.print(page.summary_table(results))
     console.print(f"The page is {written}", soft_wrap=True)
     if any(result.outcome.short for result in results):

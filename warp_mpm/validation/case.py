@@ -149,6 +149,16 @@ def reference(x: ArrayLike, y: ArrayLike, label: str = "reference") -> Curve:
 
 
 @dataclass(frozen=True)
+class Band:
+    """Where a measurement may lie, shaded."""
+
+    x: ArrayLike
+    low: ArrayLike
+    high: ArrayLike
+    label: str
+
+
+@dataclass(frozen=True)
 class Panel:
     """One diagram: ours over the reference."""
 
@@ -159,6 +169,7 @@ class Panel:
     log_x: bool = False
     log_y: bool = False
     x_range: tuple[float, float] | None = None
+    bands: Sequence[Band] = ()
 
 
 @dataclass(frozen=True)
@@ -170,11 +181,28 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
+@dataclass(frozen=True)
+class Point:
+    """A figure that was measured and computed, both with the ends of what they may be."""
+
+    quantity: str
+    by: str
+    """What computed it: `simulated`, or a formula's name."""
+    measured: float
+    measured_low: float
+    measured_high: float
+    computed: float
+    computed_low: float
+    computed_high: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What came of a case."""
 
     checks: Sequence[Check]
+    points: Sequence[Point] = ()
+    """For the picture of everything measured against everything computed."""
     panels: Sequence[Panel] = ()
     pictures: dict[str, Figure] = field(default_factory=dict)
     """Ready figures by name, for what is no diagram of curves."""
@@ -201,6 +229,8 @@ class Case:
     """The reference: formula with its origin."""
     limit: str
     """The limit in words."""
+    set_before: bool = False
+    """The limit is a text of its own, with its reason, that was written before the case was first run."""
     run: Callable[[bool], Outcome]
     """Called with True for the quick variant: a coarser or shorter run of the same checks."""
     in_quick: bool = True

@@ -14,6 +14,7 @@ from warp_mpm.validation import (
     granular,
     jets,
     paper,
+    paper_forces,
     phases,
     refinement,
     rheology,
@@ -35,6 +36,7 @@ CASES: tuple[Case, ...] = (
     *case_one.CASES,
     *refinement.CASES,
     *paper.CASES,
+    *paper_forces.CASES,
 )
 
 
@@ -44,9 +46,19 @@ def chosen(names: Sequence[str] | None, *, quick: bool) -> list[Case]:
     Raises:
         ValueError: a name is unknown.
     """
-    known = {case.name: case for case in CASES}
+    if names:
+        return named(CASES, names)
+    return [case for case in CASES if case.in_quick or not quick]
+
+
+def named(cases: Sequence[Case], names: Sequence[str] | None) -> list[Case]:
+    """Those of the cases with these names, or all.
+
+    Raises:
+        ValueError: a name is unknown.
+    """
+    known = {case.name: case for case in cases}
     for name in names or ():
         if name not in known:
             raise ValueError(f"--only {name} is no validation case; it must be one of {', '.join(known)}.")
-    cases = [known[name] for name in dict.fromkeys(names or ())]
-    return cases or [case for case in CASES if case.in_quick or not quick]
+    return [known[name] for name in dict.fromkeys(names or known)]

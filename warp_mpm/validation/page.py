@@ -19,10 +19,7 @@ from warp_mpm.performance.machine import processor
 from warp_mpm.plotting.style import GREY, RUN_COLOURS, grid, save
 from warp_mpm.validation.case import Case, Check, Outcome, Panel, number
 
-PAGE = "validation.md"
-PICTURES = "validation"
-
-INTRODUCTION = """\
+KNOWN_ANSWERS = """\
 # Validation
 
 The simulator against closed-form solutions, against experiments, against the paper, and against itself as it is
@@ -33,6 +30,36 @@ A limit belongs to the case, not to the result: what misses it stays here as **s
 differences from the reference, as shares of it unless the table says otherwise. Curves of the reference are dashed and
 grey.
 """
+
+
+MEASURED = """\
+# Held against measurements
+
+What was measured, beside what the simulator makes of it. `python -m warp_mpm validate --measured` computes every number
+and every picture of this page; `--only NAME` runs one case, `--quick` coarser ones, `--finer 2` halves every spacing.
+The figures that gate stand in the cases, with their source. The measured curves are not shipped: `--data DIR` reads
+them from a folder, draws them, and compares whole curves.
+
+Each limit was written into the docstring of its case, with its reason, before the case was first run, and is printed
+below as it stands there. What misses it stays on this page as **short**, with what was tried.
+"""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A page that a validation writes."""
+
+    name: str
+    """Of the page without its ending, and of the folder of its pictures."""
+    introduction: str
+    options: str = ""
+    """Of the command, beside `--only`."""
+
+
+KINDS = {
+    "known answers": Kind("validation", KNOWN_ANSWERS),
+    "measured": Kind("measured", MEASURED, "--measured "),
+}
 
 
 @dataclass(frozen=True)
@@ -47,14 +74,27 @@ class Result:
 # -- the page ----------------------------------------------------------------------------------------------------
 
 
-def write(folder: Path, results: Sequence[Result], *, quick: bool, versions: str) -> Path:
-    """Write the page and its pictures into `folder`; returns the page's path."""
-    pictures = folder / PICTURES
+def write(
+    folder: Path, results: Sequence[Result], *, kind: Kind, how: str, versions: str, first: Figure | None = None
+) -> Path:
+    """Write the page and its pictures into `folder`; returns the page's path.
+
+    Args:
+        folder: of the page.
+        results: of the cases, in their order.
+        kind: which page it is.
+        how: which variants were run, of what.
+        versions: of what computed it.
+        first: picture above all cases.
+    """
+    pictures = folder / kind.name
     pictures.mkdir(parents=True, exist_ok=True)
-    lines = [INTRODUCTION]
-    how = "quick variants" if quick else "full variants"
+    lines = [kind.introduction]
     seconds = sum(result.seconds for result in results)
     lines.append(f"Computed with {versions}; {how}, {seconds:.0f} s on one core ({processor()}).\n")
+    if first is not None:
+        save(first, pictures / "everything.png")
+        lines.append(f"![Everything measured against everything computed]({kind.name}/everything.png)\n")
     lines.append("| case | verdict | largest error over its limit | time |\n| --- | --- | --- | --- |")
     for result in results:
         lines.append(
@@ -62,8 +102,8 @@ def write(folder: Path, results: Sequence[Result], *, quick: bool, versions: str
             f"{_worst(result.outcome)} | {result.seconds:.0f} s |"
         )
     for result in results:
-        lines += ["", *_section(result, pictures)]
-    page = folder / PAGE
+        lines += ["", *_section(result, kind, pictures)]
+    page = folder / f"{kind.name}.md"
     write_whole(page, "\n".join(lines) + "\n")
     return page
 
@@ -73,24 +113,22 @@ def _anchor(title: str) -> str:
     return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
 
 
-def _section(result: Result, pictures: Path) -> list[str]:
+def _section(result: Result, kind: Kind, pictures: Path) -> list[str]:
     case, outcome = result.case, result.outcome
-    lines = [
-        f"## {case.title}",
-        "",
-        case.tests,
-        "",
-        f"Reference: {case.source}. Limit: {case.limit}. Run alone: `--only {case.name}`.",
-        "",
-    ]
+    alone = f"Run alone: `{kind.options}--only {case.name}`."
+    lines = [f"## {case.title}", "", case.tests, ""]
+    if case.set_before:
+        lines += [f"Reference: {case.source}. {alone}", "", "**Set before the run.** " + case.limit, ""]
+    else:
+        lines += [f"Reference: {case.source}. Limit: {case.limit}. {alone}", ""]
     for remark in outcome.remarks:
         lines += [remark, ""]
     if outcome.panels:
         save(drawn(outcome.panels), pictures / f"{case.name}.png")
-        lines += [f"![{case.title}]({PICTURES}/{case.name}.png)", ""]
+        lines += [f"![{case.title}]({kind.name}/{case.name}.png)", ""]
     for name, figure in outcome.pictures.items():
         save(figure, pictures / f"{case.name}-{name}.png")
-        lines += [f"![{name.replace('-', ' ')}]({PICTURES}/{case.name}-{name}.png)", ""]
+        lines += [f"![{name.replace('-', ' ')}]({kind.name}/{case.name}-{name}.png)", ""]
     if outcome.checks:
         lines += ["| | quantity | ours | reference | error | limit |", "| --- | --- | --- | --- | --- | --- |"]
         for check in outcome.checks:
@@ -140,6 +178,9 @@ def _worst(outcome: Outcome) -> str:
     return f"{max(shares):.2g}" if shares else ""
 
 
+MOST_LABELS = 6
+"""A longer legend stands below its panel, where it hides nothing."""
+
 # -- plots -------------------------------------------------------------------------------------------------------
 
 
@@ -147,7 +188,8 @@ def drawn(panels: Sequence[Panel]) -> Figure:
     """All panels of a case, two in a row."""
     columns = min(len(panels), 2)
     rows = math.ceil(len(panels) / columns)
-    figure = Figure(figsize=(5.2 * columns, 3.3 * rows), layout="constrained")
+    height = 4.4 if any(len(_labels(panel)) > MOST_LABELS for panel in panels) else 3.3
+    figure = Figure(figsize=(5.2 * columns, height * rows), layout="constrained")
     axes = np.atleast_1d(figure.subplots(rows, columns)).ravel()
     for panel, place in zip(panels, axes, strict=False):
         _draw(place, panel)
@@ -156,8 +198,15 @@ def drawn(panels: Sequence[Panel]) -> Figure:
     return figure
 
 
+def _labels(panel: Panel) -> list[str]:
+    labels = [*(curve.label for curve in panel.curves), *(band.label for band in panel.bands)]
+    return [label for label in labels if label]
+
+
 def _draw(place: Axes, panel: Panel) -> None:
     colours = iter(RUN_COLOURS * 4)
+    for band in panel.bands:
+        place.fill_between(band.x, band.low, band.high, color=GREY, alpha=0.25, linewidth=0.0, label=band.label or None)
     for curve in panel.curves:
         label = curve.label or None
         if curve.style == "reference":
@@ -176,8 +225,41 @@ def _draw(place: Axes, panel: Panel) -> None:
     if panel.x_range is not None:
         place.set_xlim(*panel.x_range)
     grid(place)
-    if any(curve.label for curve in panel.curves):
+    if len(_labels(panel)) > MOST_LABELS:
+        place.legend(fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.22))
+    elif _labels(panel):
         place.legend(fontsize=8)
+
+
+def everything(outcomes: Sequence[Outcome]) -> Figure | None:
+    """Each figure that was measured and computed as one point, with the ends of both; None where there is none."""
+    points = [
+        point for outcome in outcomes for point in outcome.points if point.measured > 0.0 and point.computed > 0.0
+    ]
+    if not points:
+        return None
+    figure = Figure(figsize=(7.6, 7.2), layout="constrained")
+    place = figure.subplots()
+    values = [value for point in points for value in (point.measured, point.computed)]
+    ends = np.array([0.6 * min(values), 1.6 * max(values)])
+    place.fill_between(ends, 0.8 * ends, 1.25 * ends, color=GREY, alpha=0.15, linewidth=0.0, label="within 25 %")
+    place.plot(ends, ends, color=GREY, linewidth=1.0)
+    colours, marks = iter(RUN_COLOURS * 2), iter("os^Dv<>P" * 2)
+    for by in dict.fromkeys(point.by for point in points):
+        own = [point for point in points if point.by == by]
+        measured, computed = np.array([[point.measured, point.computed] for point in own]).T
+        low = [[p.measured - p.measured_low, p.computed - p.computed_low] for p in own]
+        high = [[p.measured_high - p.measured, p.computed_high - p.computed] for p in own]
+        across, up = np.maximum(np.array([low, high]).transpose(2, 0, 1), 0.0)
+        place.errorbar(
+            measured, computed, xerr=across, yerr=up, fmt=next(marks), color=next(colours), label=f"{by} ({len(own)})",
+            markersize=5, elinewidth=0.8, capsize=1.5, alpha=0.85, linewidth=0.0,
+        )  # fmt: skip
+    place.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="measured", ylabel="computed", aspect="equal")
+    place.set_title("Everything measured against everything computed, each in its own unit", fontsize=10)
+    grid(place)
+    place.legend(fontsize=8, loc="upper left")
+    return figure
 
 
 # -- the terminal ------------------------------------------------------------------------------------------------

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from analytic.force_record import moving_mean
 from warp_mpm.accuracy.errors import Reference, extrapolate
 from warp_mpm.plotting import pore_pressure
 from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, Table, holds, reported
@@ -17,9 +15,6 @@ from warp_mpm.validation.statements import STATEMENTS
 
 PRESSURES = {"case_1": 135.0, "case_2": 172.0, "case_3": 146.0, "case_4": 123.0, "case_1_fixed": 152.0}
 """Greatest pore pressure at t = 1 s [kPa], §2.3 and Figs. 5 and 6; fixed: 135 less the stated 11 %."""
-
-GEOMETRY_CHANGE = {"case_1_fixed": 0.72, "case_1": 0.41}
-"""λ calibrated by the paper from its simulations, §3.2."""
 
 MECHANISMS = {
     "case_1": "standing jump",
@@ -31,9 +26,6 @@ MECHANISMS = {
 }
 """Table 3, and §2.3 for what was seen."""
 
-WINDOWS = (0.001, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
-"""Lengths of the moving mean of the force [s]."""
-
 
 def paper(quick: bool) -> Outcome:
     spacing = 0.4 if quick else 0.2
@@ -42,8 +34,6 @@ def paper(quick: bool) -> Outcome:
     with paper_runs(dict.fromkeys(TITLES, spacing)) as runs:
         new, table = _pressures((0.6, 0.4, 0.2) if quick else (0.4, 0.2, 0.1))
         checks, tables = [*checks, *new], [*tables, table]
-        new, more = _geometry_change(spacing, quick)
-        checks, tables = [*checks, *new], [*tables, *more]
         for name, expected in MECHANISMS.items():
             seen = runs[name].summary["mechanism"]
             measures = runs[name].summary["mechanism_measures"]
@@ -83,11 +73,11 @@ def paper(quick: bool) -> Outcome:
 
 def _remark(spacing: float) -> str:
     return (
-        f"All scenes are those of `scenarios/`, here at {spacing:g} m. The paper tells p_L,max in words and λ as a "
-        "result; its curves (Figs. 7, 10, 11) are not to be had as numbers. p_L,max is the greatest pore pressure "
-        "upstream of the crest, less the noise of single points, over 0.95 to 1.05 s. Mechanisms gate; other numbers "
-        "are reported beside the paper's, with what ours converge to, because the paper's own mesh (0.2 to 1 m) "
-        "carries an error that it does not state."
+        f"All scenes are those of `scenarios/`, here at {spacing:g} m. The paper tells p_L,max in words; its curves "
+        "(Figs. 7, 10, 11) are not to be had as numbers. p_L,max is the greatest pore pressure upstream of the "
+        "crest, less the noise of single points, over 0.95 to 1.05 s. Mechanisms gate; other numbers are reported "
+        "beside the paper's, with what ours converge to, because the paper's own mesh (0.2 to 1 m) carries an error "
+        "that it does not state."
     )
 
 
@@ -142,109 +132,6 @@ def _whose(leads: Reference, theirs: float) -> str:
     if abs(leads.value - theirs) <= max(0.1 * theirs, leads.uncertainty):
         return f"{found}, which agrees with the paper's value"
     return f"{found}: the difference from the paper is not the resolution of our grid"
-
-
-# -- λ and τ -----------------------------------------------------------------------------------------------------
-
-INFLUENCES: Mapping[str, dict[str, Any]] = {
-    "as shipped": {},
-    "no friction on the barrier": {"barrier__friction": 0.0},
-    "face as rough as the flow, tan δ = tan φ'": {"barrier__friction": 0.364},
-    "FLIP transfer (Sulsky), as in the paper": {"numerics__transfer": "flip"},
-    "no volumetric smoothing": {"numerics__volumetric_smoothing": False},
-    "no pressure filter": {"numerics__pressure_relaxation": 0.0},
-    "no bulk viscosity": {"numerics__bulk_viscosity": 0.0},
-    "9 points per cell": {"numerics__points_per_cell": 9},
-    "liquid as stiff as real water, K_L = 2.2 GPa": {"flow__material__liquid_bulk_modulus_Pa": 2.2e9},
-    "elastic flow": {"law": "elastic"},
-}
-"""What is changed in case 1, sliding and fixed, to see what moves the peak."""
-
-
-def _peak(series: Mapping[str, Array], window: float) -> tuple[float, float]:
-    """Peak [N/m] of the force's moving mean over `window` [s], and its time [s]."""
-    force = moving_mean(series["time"], series["impact_force_x"], window)
-    at = int(np.argmax(force))
-    return float(force[at]), float(series["time"][at])
-
-
-def _arrival(series: Mapping[str, Array]) -> float:
-    force = series["impact_force_x"]
-    return float(series["time"][np.argmax(force > 0.01 * force.max())])
-
-
-def _lambda(name: str, force: float) -> float:
-    """λ of a peak force: F = ¾ μ v²/(λ L), μ the reduced mass, by Eqs. (5) and (7)."""
-    scenario = paper_scene(name, 0.2)
-    barrier = scenario.barrier
-    assert barrier is not None
-    mass = scenario.flow.volume * scenario.flow.material.density
-    if barrier.mass is not None:
-        mass = mass * barrier.mass / (mass + barrier.mass)
-    return 0.75 * mass * scenario.flow.speed**2 / force / scenario.flow.equivalent_length
-
-
-def _geometry_change(spacing: float, quick: bool) -> tuple[list[Check], list[Table]]:
-    """λ and τ from the peak force of case 1, and what the peak depends on."""
-    checks = []
-    spacings = (0.4, 0.2) if quick else (0.4, 0.2, 0.1)
-    windows: list[list[str]] = []
-    for name, theirs in GEOMETRY_CHANGE.items():
-        for grid in spacings:
-            scene = paper_scene(name, grid, output__end_time_s=1.2)
-            series, _ = force_history(scene, 0.001)
-            peaks = [_peak(series, window)[0] for window in WINDOWS]
-            windows.append([f"{TITLES[name]}, {grid:g} m", *(f"{peak / 1e3:.0f}" for peak in peaks)])
-            if grid == spacing:
-                force, time = _peak(series, 0.05)
-                ours = _lambda(name, force)
-                end = 8.0 / 3.0 * ours * scene.flow.equivalent_length / scene.flow.speed
-                expected = _lambda(name, 1.0) / theirs
-                checks += [
-                    reported(
-                        f"λ, {TITLES[name]}, from the peak, mean over 0.05 s",
-                        "-",
-                        ours,
-                        reference=theirs,
-                        remark=f"the paper's λ belongs to a peak of {expected / 1e3:.0f} kN/m; ours is "
-                        f"{force / 1e3:.0f} kN/m at every spacing and for every window up to 0.1 s, so that neither "
-                        "resolution nor filtering explains the difference",
-                    ),
-                    reported(
-                        f"τ = T_1/T_2, {TITLES[name]}",
-                        "-",
-                        (time - _arrival(series)) / end,
-                        remark="the paper gives no value",
-                    ),
-                ]
-    sampling = Table(
-        "Peak of F_2,x [kN/m] by the length of its moving mean, sampled every 1 ms",
-        ("", *(f"{1e3 * window:g} ms" for window in WINDOWS)),
-        windows,
-    )
-    rows = []
-    for label, changes in INFLUENCES.items():
-        cells = [label]
-        for name in GEOMETRY_CHANGE:
-            series, _ = force_history(paper_scene(name, spacing, output__end_time_s=1.2, **changes), 0.005)
-            force, _ = _peak(series, 0.05)
-            cells += [f"{force / 1e3:.0f}", f"{_lambda(name, force):.2f}"]
-        rows.append(cells)
-    influences = Table(
-        f"What moves the peak (mean over 0.05 s, {spacing:g} m): force [kN/m] and the λ that follows",
-        ("", "fixed", "λ", "sliding", "λ"),
-        [
-            *rows,
-            [
-                "the paper's λ and the force that belongs to it",
-                f"{_lambda('case_1_fixed', 1.0) / 0.72 / 1e3:.0f}",
-                "0.72",
-                f"{_lambda('case_1', 1.0) / 0.41 / 1e3:.0f}",
-                "0.41",
-            ],
-        ],
-    )
-    return checks, [sampling, influences]
 
 
 # -- mechanisms, conceptual model, curves ------------------------------------------------------------------------
@@ -363,7 +250,7 @@ CASES = (
     Case(
         name="paper",
         title="The paper",
-        tests="Cases 1 to 6 of the paper, case 1 fixed, dry and undrained: pore pressures, λ and τ, mechanisms, the "
+        tests="Cases 1 to 6 of the paper, case 1 fixed, dry and undrained: pore pressures, mechanisms, the "
         "conceptual model's forces, and every statement of §2.3.",
         source="Cuomo, Di Perna and Martinelli, Analytical and numerical models of debris flow impact",
         limit="mechanisms as in Table 3; numbers beside the paper's, those that differ by more than 10 % with what "

@@ -1,0 +1,1 @@
+"""Cases held against measurements: `python -m warp_mpm validate --measured`."""
