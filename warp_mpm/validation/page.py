@@ -41,8 +41,11 @@ The figures that gate stand in the cases, with their source. The measured curves
 them from a folder, draws them, and compares whole curves.
 
 Each limit was written into the docstring of its case, with its reason, before the case was first run, and is printed
-below as it stands there; what was changed after a run had been seen says so. What misses its limit stays on this page as
-**short**, with what was tried.
+below as it stands there; what was changed after a run had been seen says so. What misses its limit stays on this page
+as **short**, with what was tried.
+
+In the picture a bar across reaches over what was measured, where that is known; a bar upward reaches from the finest
+spacing to the one before.
 """
 
 
