@@ -1,7 +1,7 @@
 """Exact motion of a body on a frictional base while the forces on it are linear in time; standard library only.
 
 The one integrator of stick and slip in Python: the closed form is built from it, and it is shipped inside the FMU.
-``fmu/c/model.c`` has the same in C, in the same order of operations.
+``fmu/c/barrier_sliding.c`` has the same in C, in the same order of operations.
 """
 
 from __future__ import annotations

@@ -14,9 +14,7 @@ from fmpy.fmi1 import FMICallException
 
 Open = Callable[[str], Any]
 CLOSED_FORMS = pytest.mark.parametrize("unit", ["BarrierSliding", "BarrierSlidingC", "BarrierSlidingC3"])
-EACH = pytest.mark.parametrize(
-    "unit", ["BarrierSliding", "BarrierSlidingC", "BarrierSlidingC3", "GroundAnchor", "GroundAnchorC", "GroundAnchorC3"]
-)
+EACH = pytest.mark.parametrize("unit", ["BarrierSliding", "BarrierSlidingC", "BarrierSlidingC3", "GroundAnchorC"])
 PROGRAM = Path(__file__).with_name("call_sequences.py")
 
 
@@ -31,9 +29,9 @@ def call_at_random(unit: str, count: int, archives: dict[str, Path], unzipped: d
     assert done.returncode == 0, f"{log.read_text() if log.exists() else None}\n{done.stderr[-4000:]}"
 
 
-@pytest.mark.parametrize("unit", ["BarrierSliding", "BarrierSlidingC", "GroundAnchorC3"])
+@pytest.mark.parametrize("unit", ["BarrierSliding", "BarrierSlidingC3"])
 def test_random_calls(unit: str, archives: dict[str, Path], unzipped: dict[str, Path], tmp_path: Path) -> None:
-    call_at_random(unit, 40, archives, unzipped, tmp_path / "calls")
+    call_at_random(unit, 25, archives, unzipped, tmp_path / "calls")
 
 
 @pytest.mark.slow
