@@ -238,7 +238,7 @@ def lightest(question: Question, runs: Trials, *, say: Callable[[str], None] = l
             break
         say("searching again, with the limits put right by the finer run")
         corrected = _search(question, _put_right(question.limits, rungs), runs, made, guess)
-        best = corrected.again(best.point) or corrected.run()
+        best = corrected.again(list(made))
     if kept is not None:
         answer.best, answer.rungs, answer.confirmed = kept[0], kept[1], True
     elif answer.best is not None and question.fine is None:
@@ -248,6 +248,8 @@ def lightest(question: Question, runs: Trials, *, say: Callable[[str], None] = l
         (Tried(point, question.objective.of(run.scenario), _excess(question.limits, run)), run)
         for point, run in made.items()
     ]
+    if answer.best is not None:  # found under limits that were put right, perhaps
+        answer.best = next(one for one, _ in answer.tried if one.point == answer.best.point)
     _know(answer)
     _compare_with_closed_form(answer)
     _remark(answer)

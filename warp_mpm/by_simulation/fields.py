@@ -146,7 +146,9 @@ def freed(scenario: Scenario, paths: Iterable[str]) -> tuple[Scenario, list[str]
     Raises:
         ValueError: a path leads to no number, or the barrier has no such shape.
     """
-    paths, changes, told = list(paths), {}, []
+    paths = list(paths)
+    changes: dict[str, Any] = {}
+    told: list[str] = []
     for path in paths:
         number_at(scenario, path)
         for one, other in ONE_OF:

@@ -164,7 +164,7 @@ class Search:
     @property
     def nearest(self) -> Tried:
         """The one that breaks the limits least."""
-        return min(self.tried.values(), key=lambda one: one.excess)
+        return min(self.tried.values(), key=lambda one: (one.excess, -one.objective))
 
     def run(self) -> Tried | None:
         """Find the lightest point that holds; None where no line has one."""
@@ -219,9 +219,19 @@ class Search:
             self._settle([line])
         return found
 
-    def again(self, near: Point) -> Tried | None:
-        """Find the lightest point on the line of a point, beginning there: after limits have changed a little."""
-        self._settle([Line(near[1] if len(near) > 1 else None, [min(max(self._share(near[0]), 0.05), 0.95)])])
+    def again(self, points: Iterable[Point]) -> Tried | None:
+        """Find the lightest point on the lines of points that were tried before, under limits that have changed a
+        little; none where no line has one.
+        """
+        points = list(points)
+        self._try(points)
+        lines: dict[float | None, Line] = {}
+        for point in points:
+            second = point[1] if len(point) > 1 else None
+            line = lines.setdefault(second, Line(second, []))
+            line.seen[self._share(point[0])] = self.tried[point].excess
+        # Lone points were samples; a line that had an end has more.
+        self._settle([line for line in lines.values() if len(line.seen) > 1 or len(lines) == 1])
         return self.best
 
     def contradictions(self) -> list[tuple[Tried, Tried]]:

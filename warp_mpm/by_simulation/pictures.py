@@ -99,7 +99,7 @@ def study_chart(study: Study) -> Figure:
     for (curve, bars), one in zip(axes, study.told, strict=True):
         _exceedance(curve, study, one)
         _sensitivities(bars, one)
-    axes[0][0].set_title("probability of being exceeded", fontsize=10)
+    axes[0][0].set_title("probability of being exceeded", fontsize=10, loc="left")
     axes[0][1].set_title("Sobol' indices: what it depends on", fontsize=10)
     axes[-1][1].set_xlabel("share of the variance [-]")
     axes[0][1].legend(fontsize=8, loc="best")
@@ -125,9 +125,7 @@ def _exceedance(panel: Axes, study: Study, one: Told) -> None:
         panel.axvline(limit.bound * factor, color=ORANGE, linestyle="--", linewidth=1.2)
         chance = next(found.probability for found in study.exceeded if found.limit is limit)
         side = "below" if limit.least else "above"
-        panel.annotate(
-            f" {chance:.1%} {side} the limit", (limit.bound * factor, 1.0), color=ORANGE, fontsize=8, va="top"
-        )
+        panel.set_title(f"{chance:.1%} {side} the limit", fontsize=9, color=ORANGE, loc="right")
     panel.set_xlabel(f"{one.quantity.words} [{one.quantity.shown_unit}]")
     panel.set_ylabel("probability [-]")
     panel.set_ylim(0.0, 1.02)
@@ -141,4 +139,5 @@ def _sensitivities(panel: Axes, one: Told) -> None:
     panel.barh(places - 0.2, [one.first[name] for name in names], 0.36, color=GREEN, label="first order")
     panel.set_yticks(places, [words(name) for name in names], fontsize=8)
     panel.set_xlim(0.0, max(1.0, max(one.total.values()) * 1.05))
+    panel.set_axisbelow(True)
     grid(panel)

@@ -121,7 +121,7 @@ def told(answer: Answer) -> list[tuple[str, str]]:
     limits = "; ".join(limit.text for limit in question.limits)
     if best is None:
         ranges = "; ".join(f"{words(one.path)} {one.low:.4g} to {one.high:.4g}" for one in question.ranges)
-        nearest = min(answer.tried, key=lambda pair: pair[0].excess)
+        nearest = min(answer.tried, key=lambda pair: (pair[0].excess, -pair[0].objective))
         figures = nearest[1].figures or {}
         came = "; ".join(f"{limit.quantity.words} {limit.shown(figures.get(limit.name))}" for limit in question.limits)
         at = ", ".join(f"{words(path)} {value:.4g}" for path, value in question.values(nearest[0].point).items())

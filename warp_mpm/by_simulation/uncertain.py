@@ -329,6 +329,8 @@ def _indices(
     paths = [one.path for one in design.uncertain]
     if surrogate.error == 0.0 and surrogate.kind == "a constant":
         return dict.fromkeys(paths, 0.0), dict.fromkeys(paths, 0.0)
+    if len(paths) == 1:
+        return {paths[0]: 1.0}, {paths[0]: 1.0}
 
     def function(shares: Array) -> Array:
         return surrogate((_mapped(design.uncertain, shares.T) - centre) / spread)
