@@ -138,6 +138,7 @@ class Standing:
         for pipe, process in self._idle:
             process.terminate()
             pipe.close()
+            process.join()
         self._idle.clear()
 
     def run(

@@ -27,7 +27,10 @@ PAGE = (8.27, 11.69)
 LEFT, RIGHT, TOP, BOTTOM = 0.08, 0.95, 0.95, 0.06
 """Edges of what is printed, as shares of the page."""
 
-RESOLUTION = 220
+LETTERS = 102
+"""In a line of 9 points."""
+
+RESOLUTION = 160
 """Of the pictures [dots per inch]."""
 
 WIDEST_TABLE = 4
@@ -69,7 +72,7 @@ class _Book:
 
     def text(self, words: str, *, size: float = 9.0, weight: str = "normal", colour: str = "black") -> None:
         """A paragraph over the page's width."""
-        width = int(118 * 9.0 / size)
+        width = int(LETTERS * 9.0 / size)
         for line in [part for paragraph in words.split("\n") for part in textwrap.wrap(paragraph, width) or [""]]:
             self._room(size)
             assert self._figure is not None
@@ -92,10 +95,10 @@ class _Book:
         count = max((len(cells) for _, cells in rows), default=1)
         names = 0.34 if count < 3 else 0.27
         width = (RIGHT - LEFT - names) / count
-        letters = int(width * PAGE[0] * 72 / (0.52 * size))
+        letters = int(width * PAGE[0] * 72 / (0.6 * size))
         for name, cells in ([("", list(header))] if header else []) + [(name, list(cells)) for name, cells in rows]:
             parts = [textwrap.wrap(cell, letters, break_long_words=True) or [""] for cell in cells]
-            head = textwrap.wrap(name, int(names * PAGE[0] * 72 / (0.52 * size)), drop_whitespace=False) or [""]
+            head = textwrap.wrap(name, int(names * PAGE[0] * 72 / (0.6 * size)), drop_whitespace=False) or [""]
             lines = max(len(head), *(len(part) for part in parts))
             self._room(size * lines)
             assert self._figure is not None
@@ -110,12 +113,11 @@ class _Book:
                 self._y -= _height(size)
             self._y -= _height(0.15 * size)
 
-    def picture(self, figure: Figure, caption: str) -> None:
-        """A picture as wide as the page, in its own proportions, with words below."""
+    def picture(self, figure: Figure, caption: str, *, tallest: float = 0.8) -> None:
+        """A picture in its own proportions, as wide as the page or as high as a share of it, with words below."""
         image = _image(figure)
         width = RIGHT - LEFT
         height = width * PAGE[0] * image.shape[0] / image.shape[1] / PAGE[1]
-        tallest = TOP - BOTTOM - 0.09
         if height > tallest:
             width, height = width * tallest / height, tallest
         if self._figure is None or self._y - height - 0.04 < BOTTOM:
@@ -180,6 +182,12 @@ def _cover(book: _Book, contents: Sequence[dict[str, Any]]) -> None:
         f"Impact of a debris flow on a barrier, simulated by the material point method. {made}.", colour="#61656B"
     )
     for content in contents:
+        judged = dict(content["figures"]).get("verdict")
+        if judged is not None:
+            colour = {"holds": "#007a53", "does NOT hold": "#b00020"}.get(judged, "#61656B")
+            of = "Verdict" if one else f"Verdict on {content['name']}"
+            book.text(f"{of}: {judged}", size=12.0, weight="bold", colour=colour)
+    for content in contents:
         book.skip(4.0)
         if not one:
             book.text(f"{content['name']}: {content['title']}", size=10.0, weight="bold")
@@ -215,10 +223,14 @@ def _tables(book: _Book, contents: Sequence[dict[str, Any]], part: str) -> None:
 def _pictures(book: _Book, runs: Sequence[Results], stills: Sequence[float]) -> None:
     for results in runs:
         name = f"{results.path.resolve().name}: " if len(runs) > 1 else ""
-        book.picture(plotting.scene(results.scenario), f"{name}The scene before it begins, with its measures.")
+        book.picture(
+            plotting.scene(results.scenario), f"{name}The scene before it begins, with its measures.", tallest=0.34
+        )
         with contextlib.suppress(ResultsError):  # a scene without a barrier has no force to draw
             book.picture(
-                plotting.force_and_displacement(results), f"{name}Forces on the barrier, its motion, and energies."
+                plotting.force_and_displacement(results),
+                f"{name}Forces on the barrier, its motion, and energies.",
+                tallest=0.44,
             )
         if results.scenario.output.loads_by_height:
             with contextlib.suppress(ResultsError):  # a run that ended before its second sample has none
