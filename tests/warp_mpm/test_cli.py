@@ -292,9 +292,9 @@ def test_public_names():
         _ = warp_mpm.Simulatoin
 
 
-def test_check_as_json(tmp_path):
+def test_check_as_json(command, tmp_path):
     """Numbers and notes of what is right, problems of what is not; one list, and the exit code of the worst."""
-    (tmp_path / "bad.json").write_text(json.dumps(json.loads(SET_IIB.read_text()) | {"ground": {"friction": -1}}))
+    (tmp_path / "bad.json").write_text(json.dumps(json.loads(Path(SET_IIB).read_text()) | {"ground": {"friction": -1}}))
     result = command("check", SET_IIB, tmp_path / "bad.json", "--json")
     assert result.exit_code == 2
     assert result.stderr == ""
