@@ -24,7 +24,7 @@ def init(
     speed: Annotated[str | None, _option("Speed of the flow [m/s]; also in km/h.")] = None,
     slope: Annotated[str | None, _option("Slope of the ground, falling with the flow [degrees]; 0.")] = None,
     bulk_density: Annotated[
-        str | None, _option("Bulk density of the flow [kg/m3]; also in t/m3, kN/m3. It gives the porosity.")
+        str | None, _option("Bulk density of the flow [kg/m3]; also in t/m3, or a unit weight. It gives the porosity.")
     ] = None,
     water_content: Annotated[
         str | None, _option("Mass of water over mass of grains [-]; also in %. In place of the bulk density.")
@@ -39,7 +39,7 @@ def init(
     height: Annotated[str | None, _option("Height of the barrier [m].")] = None,
     crest: Annotated[str | None, _option("Width of the barrier's crest [m]; 1.")] = None,
     face_angle: Annotated[str | None, _option("Angle of the barrier's faces with the ground [degrees]; 75.")] = None,
-    mass: Annotated[str | None, _option("Mass of the barrier [kg/m]; also in t/m, kN/m.")] = None,
+    mass: Annotated[str | None, _option("Mass of the barrier [kg/m]; also in t/m, or a weight.")] = None,
     barrier_density: Annotated[str | None, _option("Density of the barrier [kg/m3]; 2000. In place of mass.")] = None,
     sliding: Annotated[bool, typer.Option("--sliding/--fixed", help="Whether the barrier may slide.")] = True,
     base_friction: Annotated[str | None, _option("Friction coefficient under the barrier [-]; 0.5.")] = None,
