@@ -25,6 +25,46 @@ def described(scenario: Scenario) -> list[str]:
     ]
 
 
+def numbers(scenario: Scenario) -> dict[str, float | str | None]:
+    """What a scene comes to, SI; None of what it does not have."""
+    flow, barrier = scenario.flow, scenario.barrier
+    material: Any = flow.material
+    gravity = scenario.gravity.acceleration_m_per_s2
+    shape = barrier.shape if barrier is not None else None
+    base, crest, height = shape.base_crest_height if isinstance(shape, Trapezoid) else (None, None, None)
+    edges = domain_extent(scenario).edges
+    return {
+        "formulation": flow.formulation,
+        "flow_volume_m3_per_m": flow.volume,
+        "flow_mass_kg_per_m": flow.volume * material.density,
+        "flow_depth_m": flow.depth,
+        "flow_length_m": flow.equivalent_length,
+        "flow_speed_m_per_s": flow.speed,
+        "froude_number": flow.speed / (gravity * flow.depth) ** 0.5 if gravity > 0.0 else None,
+        "bulk_density_kg_per_m3": material.density,
+        "porosity": material.porosity,
+        "friction_angle_deg": getattr(material, "friction_angle_deg", None),
+        "hydraulic_conductivity_m_per_s": getattr(material, "hydraulic_conductivity", None),
+        "young_modulus_Pa": material.young_modulus_Pa,
+        "lateral_stress_ratio": flow.lateral_stress_ratio,
+        "slope_deg": scenario.gravity.tilt_deg,
+        "ground_friction": None if scenario.ground is None else scenario.ground.friction,
+        "barrier_motion": None if barrier is None else barrier.motion.kind,
+        "barrier_mass_kg_per_m": None if barrier is None else barrier.mass,
+        "barrier_base_width_m": base,
+        "barrier_crest_width_m": crest,
+        "barrier_height_m": height,
+        "barrier_face_angle_deg": shape.built_face_angle_deg if isinstance(shape, Trapezoid) else None,
+        "end_time_s": scenario.output.end_time_s,
+        "spacing_m": scenario.numerics.spacing_m,
+        "material_points": round(flow.volume / scenario.numerics.spacing_m**2 * scenario.numerics.points_per_cell),
+        "domain_left_m": edges.left,
+        "domain_right_m": edges.right,
+        "domain_bottom_m": edges.bottom,
+        "domain_top_m": edges.top,
+    }
+
+
 def described_material(scenario: Scenario) -> str:
     """The flow's material in one line, as a geotechnical engineer asks for it, with its length."""
     flow = scenario.flow

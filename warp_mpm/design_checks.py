@@ -209,8 +209,7 @@ def _block(scenario: Scenario, design: Design) -> _Block | str:
     """The block, or why it is not known."""
     barrier = scenario.barrier
     assert barrier is not None
-    if not isinstance(barrier.shape, Trapezoid):
-        return "A wall without end has no base: its stability is not judged."
+    assert isinstance(barrier.shape, Trapezoid)
     friction, density = design.base_friction, design.density_kg_per_m3
     mass = None if density is None else density * geometry.area(barrier.shape.polygon)
     if isinstance(barrier.motion, Sliding):
@@ -226,6 +225,9 @@ def _stability(
     scenario: Scenario, design: Design, series: Series, remarks: list[str]
 ) -> dict[str, tuple[float | None, float | None]]:
     """Factors of safety, eccentricity and base pressure: the worst over time, with its time [s]."""
+    assert scenario.barrier is not None
+    if not isinstance(scenario.barrier.shape, Trapezoid):
+        return _sliding_of_wall(scenario, design, series, remarks)
     needed = [f"{name}_force_{axis}" for name in ("impact", "back") for axis in "xy"]
     needed += ["top_force", "top_force_y", "heel_moment"]
     block = _block(scenario, design)
@@ -262,6 +264,33 @@ def _stability(
     found["eccentricity_of_base"] = _greatest(time, share)
     found["base_pressure"] = _greatest(time, pressure)
     return found
+
+
+def _sliding_of_wall(
+    scenario: Scenario, design: Design, series: Series, remarks: list[str]
+) -> dict[str, tuple[float | None, float | None]]:
+    """The factor of sliding of a wall without end, by its mass; it has no base to turn over or to press with."""
+    barrier = scenario.barrier
+    assert barrier is not None
+    if not isinstance(barrier.motion, Sliding):
+        remarks.append(
+            "A wall without end that does not slide has neither weight nor base: its stability is not judged."
+        )
+        return {}
+    remarks.append("A wall without end has no base: only its sliding is judged, by its mass.")
+    missing = [name for name in ("impact_force_x", "impact_force_y") if name not in series]
+    if missing or len(series["time"]) < 2:
+        remarks.append(f"The barrier's stability is not known without {', '.join(missing) or 'samples'}.")
+        return {}
+    assert barrier.mass is not None
+    time, tilt = series["time"], math.radians(scenario.gravity.tilt_deg)
+    weight = barrier.mass * scenario.gravity.acceleration_m_per_s2
+    push, lift = (design.load_factor * moving_mean(time, series[f"impact_force_{axis}"]) for axis in "xy")
+    across = push + weight * math.sin(tilt)
+    if design.boulder is not None:
+        across = across + _boulder_push(scenario, design)[0]
+    friction = barrier.motion.base_friction_coefficient / design.base_friction_factor
+    return {"sliding_factor": _least(time, friction * np.maximum(weight * math.cos(tilt) - lift, 0.0), across)}
 
 
 def _least(time: Array, withstands: Array, load: Array) -> tuple[float | None, float | None]:
@@ -302,12 +331,15 @@ def boulder_force(scenario: Scenario, design: Design) -> float:
 def _overtopping(scenario: Scenario, figures: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
     assert scenario.barrier is not None
     found: dict[str, tuple[float | None, float | None]] = {}
+    if not isinstance(scenario.barrier.shape, Trapezoid):
+        # Nothing gets over a wall without end; what left the domain did so elsewhere.
+        return {"overtopped_share": (0.0, None), "overtopped_volume": (0.0, None), "freeboard": (None, None)}
     beyond, left = figures.get("overtopped_volume"), figures.get("left_volume")
     if beyond is not None:
         volume = float(beyond) + max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
         found["overtopped_share"] = (volume / scenario.flow.volume, None)
         found["overtopped_volume"] = (volume, None)
-    if isinstance(scenario.barrier.shape, Trapezoid) and figures.get("run_up_max") is not None:
+    if figures.get("run_up_max") is not None:
         height = scenario.barrier.shape.base_crest_height[2]
         found["freeboard"] = (height - float(figures["run_up_max"]), figures.get("run_up_max_time"))
     return found
@@ -367,7 +399,8 @@ def verdict_rows(verdict: Mapping[str, Any]) -> list[tuple[str, str]]:
     for entry in verdict["checks"]:
         check = CHECKS[entry["name"]]
         value, limit = entry["value"], entry["limit"]
-        text = ("no load" if check.least else "without end") if value is None else check.text(value).removesuffix(" -")
+        nothing = "no crest to reach" if check.name == "freeboard" else "no load" if check.least else "without end"
+        text = nothing if value is None else check.text(value).removesuffix(" -")
         text += f" at {entry['time']:.3f} s" if entry["time"] is not None else ""
         if limit is not None:
             bound = check.text(limit).removesuffix(" -")

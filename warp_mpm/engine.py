@@ -16,10 +16,12 @@ from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 POLL = 0.2
 """Time between looks at what runs [s]."""
+
+DIED = "the process died, for want of memory perhaps"
 
 ALLOWED_FAILURES = 5
 """How many of Dask's workers may die under a task before it counts as failed: one that kills them must not go on."""
@@ -119,6 +121,91 @@ class Processes:
                 pipe.close()
 
 
+class Standing:
+    """Processes of this machine that stay for the tasks to come, where a task is as short as a process's beginning.
+
+    A context manager; at its end they are gone.
+    """
+
+    def __init__(self, at_once: int):
+        self.at_once = at_once
+        self._idle: list[tuple[Connection, SpawnProcess]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *of_an_error: object) -> None:
+        for pipe, process in self._idle:
+            process.terminate()
+            pipe.close()
+            process.join()
+        self._idle.clear()
+
+    def run(
+        self,
+        tasks: Sequence[Task],
+        *,
+        on_start: Callable[[Task], None] = lambda task: None,
+        on_look: Callable[[Task], None] = lambda task: None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Iterator[Ended]:
+        """As of any engine."""
+        waiting = list(tasks)
+        running: dict[Connection, tuple[Task, SpawnProcess]] = {}
+        told = False
+        try:
+            while running or (waiting and not stop()):
+                while waiting and len(running) < self.at_once and not stop():
+                    task = waiting.pop(0)
+                    ours, process = self._given(task)
+                    running[ours] = task, process
+                    on_start(task)
+                ready = wait(list(running), timeout=POLL)
+                if stop() and not told:
+                    told = True
+                    for _, process in running.values():
+                        process.terminate()
+                for pipe in ready:
+                    assert isinstance(pipe, Connection)
+                    task, process = running.pop(pipe)
+                    try:
+                        result, problem = pipe.recv()
+                    except EOFError:
+                        pipe.close()
+                        process.join()
+                        yield Ended(task, None, DIED, True, process.exitcode)
+                        continue
+                    self._idle.append((pipe, process))
+                    yield Ended(task, result, problem)
+                for task, _ in running.values():
+                    on_look(task)
+        finally:
+            for pipe, (_, process) in running.items():
+                process.terminate()
+                pipe.close()
+
+    def _given(self, task: Task) -> tuple[Connection, SpawnProcess]:
+        """A process that has been given the task: one that stands idle, unless it has died meanwhile, or a new one."""
+        while self._idle:
+            ours, process = self._idle.pop()
+            with contextlib.suppress(OSError):
+                ours.send((task.function, task.arguments))
+                return ours, process
+            ours.close()
+        ours, process = self._begun()
+        ours.send((task.function, task.arguments))
+        return ours, process
+
+    def _begun(self) -> tuple[Connection, SpawnProcess]:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(theirs,), name="standing")
+        with _held_ctrl_c():
+            process.start()
+        theirs.close()
+        return ours, process
+
+
 @dataclass(frozen=True)
 class Dask:
     """The workers of a Dask scheduler; what a worker that died was at is run again by another."""
@@ -203,13 +290,19 @@ def _held_ctrl_c() -> Iterator[None]:
 
 def _work(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Of a process: the task, and how it ended."""
-    if hasattr(os, "setsid"):
-        # Ctrl-C is for the process that began this one, which passes it on once.
-        os.setsid()
-        heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # drops one that came before
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        signal.signal(signal.SIGINT, heard)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _leave_ctrl_c_to_parent()
+    _answer(pipe, function, arguments)
+
+
+def _serve(pipe: Connection) -> None:
+    """Of a process that stays: one task after the other, until nobody asks any more."""
+    _leave_ctrl_c_to_parent()
+    with contextlib.suppress(EOFError):
+        while True:
+            _answer(pipe, *pipe.recv())
+
+
+def _answer(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     result, problem = None, None
     try:
         result = function(*arguments)
@@ -217,6 +310,16 @@ def _work(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, 
         problem = f"{type(error).__name__}: {error}"
     with contextlib.suppress(BrokenPipeError):  # nobody waits for it any more
         pipe.send((result, problem))
+
+
+def _leave_ctrl_c_to_parent() -> None:
+    """Ctrl-C is for the process that began this one, which passes it on once; and end with it."""
+    if hasattr(os, "setsid"):
+        os.setsid()
+        heard = signal.signal(signal.SIGINT, signal.SIG_IGN)  # drops one that came before
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, heard)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
@@ -232,7 +335,7 @@ def _ended(task: Task, process: SpawnProcess, pipe: Connection) -> Ended:
         result, problem = pipe.recv()
         died = False
     except EOFError:
-        result, problem, died = None, "the process died, for want of memory perhaps", True
+        result, problem, died = None, DIED, True
     pipe.close()
     process.join()
     return Ended(task, result, problem, died, process.exitcode if died else None)

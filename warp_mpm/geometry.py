@@ -136,10 +136,10 @@ def depth_below_surface(polygon: Polygon, points: NDArray[np.float64]) -> NDArra
     return np.where(np.isfinite(above), above - y, 0.0)
 
 
-def front_and_tail(depth: float, squares: int, distance: float) -> Polygon:
+def front_and_tail(depth: float, squares: float, distance: float) -> Polygon:
     """Outline of the paper's flow: a front at 45°, `squares` squares of side `depth`, a tail of three depths (§2.2).
 
-    The toe of the front lies at x = -distance. Area (2 + squares) · depth².
+    The toe of the front lies at x = -distance. Area (2 + squares) · depth²; `squares` need not be whole.
     """
     front = -distance - depth
     back = front - squares * depth

@@ -22,6 +22,7 @@ from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
 from warp_mpm.recording import (
     Checkpointer,
+    LoadsInMemory,
     LoadsRecorder,
     Recorder,
     RunFolder,
@@ -37,7 +38,7 @@ from warp_mpm.recording import (
 from warp_mpm.recording.checkpoint import Checkpoint, versions
 from warp_mpm.recording.run_folder import RunFolderError
 from warp_mpm.recording.surfaces import write_surfaces
-from warp_mpm.results import Results, ResultsError
+from warp_mpm.results import Loads, Results, ResultsError, SurfaceLoads
 from warp_mpm.scenario import Scenario
 from warp_mpm.snapshot import Snapshot
 from warp_mpm.summary import summarize
@@ -87,6 +88,8 @@ class MemoryRun:
     """As of `Results.snapshots`, in double precision."""
     summary: dict[str, Any]
     """Key figures, as in summary.json."""
+    loads: Loads | None = None
+    """Loads by height, as of `Results.loads`; None unless `output.loads_by_height` asks for them."""
 
 
 def run_in_memory(
@@ -114,7 +117,8 @@ def run_in_memory(
     output = scenario.output
     series = SeriesInMemory(Schedule(output.time_series_interval_s), quantities=_asked(scenario))
     snapshots = SnapshotsInMemory(Schedule(output.snapshot_interval_s))
-    all_recorders: list[Recorder] = [series, snapshots, *recorders]
+    loads = LoadsInMemory(Schedule(output.time_series_interval_s)) if output.loads_by_height else None
+    all_recorders: list[Recorder] = [series, snapshots, *([loads] if loads is not None else []), *recorders]
     report = _reporter(scenario, series, on_progress)
     try:
         finished = record_until(simulation, all_recorders, output.end_time_s, on_step=report, stop=stop)
@@ -128,7 +132,16 @@ def run_in_memory(
     columns = series.series()
     summary = summarize(scenario, columns, snapshots.snapshots, _of_the_run(record))
     summary["notes"] = [*scene_caveats(scenario), *run_caveats(record, summary)]
-    return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary)
+    kept = None if loads is None else _loads(loads)
+    return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary, kept)
+
+
+def _loads(recorder: LoadsInMemory) -> Loads:
+    surfaces = {}
+    for stretch in recorder.stretches:
+        place, height = (stretch.begin[:, None] + stretch.along[:, None] * stretch.edges)[:2]
+        surfaces[stretch.surface] = SurfaceLoads(stretch.edges, place, height, recorder.pressures(stretch.surface))
+    return Loads(np.array(recorder.times), surfaces)
 
 
 def run_scenario(

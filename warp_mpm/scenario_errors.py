@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import types
 import typing
 from collections.abc import Iterator, Sequence
@@ -82,6 +83,17 @@ def sentences(error: ValidationError, model: type[BaseModel]) -> list[str]:
 def allowed(path: str, model: type[BaseModel]) -> str:
     """What a field takes, in words, as the sentences have it; `path` as in `numerics.spacing_m`."""
     return _range_of(_walk(tuple(path.split(".")), model)[1])
+
+
+def bounds(model: type[BaseModel], field: str) -> tuple[float, float]:
+    """Least and greatest number that a field of a model takes; infinite where there is no bound."""
+    low, high = -math.inf, math.inf
+    for constraint in _constraints(_members(model.model_fields[field].rebuild_annotation())[0]):
+        if isinstance(constraint, Gt | Ge):
+            low = max(low, float(constraint.gt if isinstance(constraint, Gt) else constraint.ge))  # type: ignore[arg-type]
+        elif isinstance(constraint, Lt | Le):
+            high = min(high, float(constraint.lt if isinstance(constraint, Lt) else constraint.le))  # type: ignore[arg-type]
+    return low, high
 
 
 def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:

@@ -529,3 +529,9 @@ def test_core_and_command_line_agree() -> None:
     )
     found = answer("predict", *FIG_9, "--vertical-load-ratio", "0.4")
     assert found["barrier_displacement_final"] == impact.barrier_displacement_final
+
+
+def test_design_says_how_far_off_it_may_be_and_what_does_better() -> None:
+    notes = answer("design", str(SCENARIOS / "case_1.json"), "--limit", "1")["notes"]
+    assert "off by a factor of two" in " ".join(notes)
+    assert "python -m warp_mpm design SCENARIO" in " ".join(notes)

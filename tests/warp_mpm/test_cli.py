@@ -290,3 +290,22 @@ def test_public_names():
         assert getattr(warp_mpm, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'Simulatoin'"):
         _ = warp_mpm.Simulatoin
+
+
+def test_check_as_json(command, tmp_path):
+    """Numbers and notes of what is right, problems of what is not; one list, and the exit code of the worst."""
+    (tmp_path / "bad.json").write_text(json.dumps(json.loads(Path(SET_IIB).read_text()) | {"ground": {"friction": -1}}))
+    result = command("check", SET_IIB, tmp_path / "bad.json", "--json")
+    assert result.exit_code == 2
+    assert result.stderr == ""
+    right, wrong = json.loads(result.stdout)
+    assert (right["valid"], right["problems"]) == (True, [])
+    scenario = Scenario.load(SET_IIB)
+    numbers = right["numbers"]
+    assert numbers["bulk_density_kg_per_m3"] == scenario.flow.material.density
+    assert numbers["barrier_mass_kg_per_m"] == scenario.barrier.mass
+    assert numbers["flow_mass_kg_per_m"] == pytest.approx(scenario.flow.volume * scenario.flow.material.density)
+    assert wrong["valid"] is False
+    assert wrong["problems"] == [
+        "ground.friction = -1 is not allowed; it must be a finite number at least 0 and at most 10."
+    ]

@@ -165,13 +165,40 @@ def test_what_cannot_be_judged_is_said(load_scene):
     wall = load_scene("case_5", design={"sliding_factor": 1.5, "displacement_m": 1.0})
     found = verdict(wall, constant(), FIGURES)
     assert found["holds"] is None
-    assert "A wall without end has no base: its stability is not judged." in found["remarks"]
+    unstable = "A wall without end that does not slide has neither weight nor base: its stability is not judged."
+    assert unstable in found["remarks"]
     assert any(remark.startswith("sliding, factor of safety: not known") for remark in found["remarks"])
     weightless = load_scene("case_1_fixed", design={"overturning_factor": 1.5})
     assert "design.density_kg_per_m3 is needed" in verdict(weightless, constant(), FIGURES)["remarks"][0]
     series = {name: values for name, values in constant().items() if name != "heel_moment"}
     assert "not known without heel_moment" in answers(block(load_scene), series)[1]["remarks"][0]
     assert verdict(load_scene("case_1"), constant(), FIGURES) is None
+
+
+def test_a_wall_without_end_that_slides(load_scene):
+    """By its mass it slides or not; nothing gets over it, whatever left the domain elsewhere."""
+    scenario = load_scene(
+        "case_5",
+        **{
+            "gravity.tilt_deg": 5.0,
+            "barrier.motion": {"kind": "sliding", "mass_kg_per_m": 90e3, "base_friction": 0.5},
+            "design": {"sliding_factor": 1.2, "overtopped_share": 0.0, "freeboard_m": 1.0, "load_factor": 1.5},
+        },
+    )
+    series = {name: values for name, values in constant().items() if name in ("time", "impact_force_x", "run_up")}
+    series["impact_force_y"] = np.full(len(series["time"]), -10e3)
+    checks, found = answers(scenario, series)
+    weight = 90e3 * G
+    down, along = weight * math.cos(math.radians(5.0)), weight * math.sin(math.radians(5.0))
+    assert checks["sliding_factor"]["value"] == pytest.approx(0.5 * (down + 15e3) / (75e3 + along))
+    assert checks["sliding_factor"]["holds"] is True
+    assert checks["overtopped_share"] == checks["overtopped_share"] | {"value": 0.0, "holds": True}
+    assert checks["freeboard"]["holds"] is True
+    assert "overturning_factor" not in checks
+    assert found["holds"] is True
+    rows = dict(verdict_rows(found))
+    assert rows["  freeboard"].startswith("no crest to reach")
+    assert "only its sliding is judged" in rows["  remark"]
 
 
 def test_a_boulder_is_superposed(load_scene):

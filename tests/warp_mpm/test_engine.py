@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from warp_mpm.engine import Processes, Task
+from warp_mpm.engine import Processes, Standing, Task
 from warp_mpm.results import Results
 from warp_mpm.sweep import SweepError, study
 
@@ -102,3 +102,25 @@ def test_study_that_cannot_be(load_scene, tmp_path):
     with pytest.raises(SweepError, match=r"study: .*needs distributions"):
         study(scene, {"flow.material.porosity": [0.5]}, tmp_path / "study", method="random", samples=3)
     assert not (tmp_path / "study").exists()
+
+
+def test_processes_that_stay():
+    """One for all tasks, of this call and the next; one that dies is replaced, and none is left at the end."""
+    with Standing(1) as engine:
+        first, second = engine.run([Task("first", os.getpid, ()), Task("second", os.getpid, ())])
+        assert first.result == second.result != os.getpid()
+        wrong, died = engine.run([Task("wrong", divmod, (7, 0)), Task("dies", os._exit, (9,))])
+        assert wrong.problem.startswith("ZeroDivisionError: ")
+        assert (died.died, died.exit_code) == (True, 9)
+        (third,) = engine.run([Task("third", os.getpid, ())])
+        assert third.result not in (first.result, os.getpid())
+        # Whoever breaks off ends what runs, and can go on with others.
+        long = engine.run([Task("long", time.sleep, (600,))], on_look=lambda task: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            next(long)
+        (fourth,) = engine.run([Task("fourth", os.getpid, ())])
+        last = fourth.result
+    gone = time.monotonic() + 10.0
+    while time.monotonic() < gone and Path(f"/proc/{last}").exists():
+        time.sleep(0.05)
+    assert not Path(f"/proc/{last}").exists()

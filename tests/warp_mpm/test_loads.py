@@ -401,3 +401,21 @@ def test_loads_by_height_need_a_barrier_and_room(load_scene):
             load_scene,
             **{"numerics.spacing_m": 0.005, "output.time_series_interval_s": 1e-6, "output.end_time_s": 9.0},
         )
+
+
+def test_loads_in_memory_are_those_of_the_folder(load_scene, tmp_path):
+    changes = {"numerics.spacing_m": 0.75, "output.end_time_s": 0.5, "output.loads_by_height": True}
+    scenario = load_scene("case_1", **changes)
+    run_scenario(scenario, tmp_path / "run", make_simulation=Simulation)
+    kept, written = run_in_memory(scenario, make_simulation=Simulation).loads, read_loads(tmp_path / "run/loads.h5")
+    np.testing.assert_array_equal(kept.times, written.times)
+    assert list(kept.surfaces) == list(written.surfaces)
+    for name, surface in written.surfaces.items():
+        for part in ("edges", "place", "height"):
+            np.testing.assert_array_equal(getattr(kept.surfaces[name], part), getattr(surface, part))
+        assert set(kept.surfaces[name].pressures) == set(surface.pressures)
+        for kind, values in surface.pressures.items():
+            np.testing.assert_array_equal(kept.surfaces[name].pressures[kind], values)
+    assert written.surfaces["impact"].pressures["normal"].max() > 0.0
+    plain = scenario.replaced({"output.loads_by_height": False, "output.end_time_s": 0.01})
+    assert run_in_memory(plain, make_simulation=Simulation).loads is None

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from warp_mpm.cli import app
 from warp_mpm.fields import field_values
 from warp_mpm.report import write_report
+from warp_mpm.report.pdf import write_pdf
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 
@@ -152,3 +153,40 @@ def test_bad_input_is_one_sentence(run, arguments, words):
     assert words in answer.stderr
     assert "Traceback" not in answer.output
     assert not list(run.glob("*.html*"))
+
+
+def test_page_prints_reads_and_fits(run, tmp_path):
+    """What no browser is needed for: the rules that paper, the dark, a narrow window and a screen reader ask for."""
+    write_report([Results.open(run)], tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    printed = page[page.index("@media print") : page.index("</style>")]
+    assert "canvas.viewer, canvas.still { height: auto !important; }" in printed
+    hidden = re.search(r"([^{}]*)\{ display: none; \}", printed).group(1)
+    assert ".hint" in hidden
+    assert "caption" not in hidden
+    # Captions of the stills are no hints, which paper leaves out.
+    assert 'createElement("p"), {className: "caption"}' in page
+    assert "@media screen and (prefers-color-scheme: dark)" in page
+    assert 'heading(words, "col")' in page
+    assert 'heading(name, "row")' in page
+    assert "minmax(min(430px, 100%), 1fr)" in page
+    # Every variable of the style has a value.
+    assert set(re.findall(r"var\((--[\w-]+)\)", page)) <= set(re.findall(r"(--[\w-]+):", page))
+
+
+def test_report_as_a_pdf(run):
+    """A cover, pictures, an appendix, on A4."""
+    answer = CliRunner().invoke(app, ["report", str(run), "--pdf", "--times", "1,2"])
+    assert answer.exit_code == 0, answer.output
+    data = (run / "report.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+    pages = len(re.findall(rb"/Type /Page\b", data))
+    assert 3 <= pages <= 12
+    assert re.search(rb"/MediaBox \[ 0 0 595\.\d+ 841\.\d+ \]", data)  # A4
+    (run / "report.pdf").unlink()
+
+
+@pytest.mark.slow
+def test_a_pdf_of_two_runs(run, tmp_path):
+    write_pdf([Results.open(run), Results.open(run)], tmp_path / "two.pdf", times=(1.0,))
+    assert len(re.findall(rb"/Type /Page\b", (tmp_path / "two.pdf").read_bytes())) > 5

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -418,8 +419,25 @@ def test_whole_numbers_may_be_written_with_a_point(case_1):
     assert case_1.replaced({"flow.shape.squares": 3.0}).flow.shape.squares == 3
     with pytest.raises(ScenarioError, match=r"squares = 2.5 is not allowed; it must be a whole number at least 0"):
         case_1.replaced({"flow.shape.squares": 2.5})
-    squares = json.loads(json_schema())["$defs"]["FrontAndTail"]["properties"]["squares"]
+    squares, _ = json.loads(json_schema())["$defs"]["FrontAndTail"]["properties"]["squares"]["anyOf"]
     assert (squares["type"], squares["minimum"], squares["maximum"]) == ("integer", 0, 100_000)
+
+
+def test_a_flow_may_be_given_by_its_length(load_scene):
+    case_1 = load_scene("case_1")
+    metres = case_1.replaced({"flow.shape.squares": None, "flow.shape.length_m": 15.0})
+    np.testing.assert_allclose(metres.flow.polygon, case_1.flow.polygon, rtol=0.0, atol=1e-12)
+    odd = case_1.replaced({"flow.shape.squares": None, "flow.shape.length_m": 13.7}).flow
+    assert (odd.volume, odd.depth) == (pytest.approx(13.7 * 3.0), 3.0)
+    shortest = case_1.replaced({"flow.shape.squares": None, "flow.shape.length_m": 6.0}).flow
+    assert (shortest.volume, len(shortest.polygon)) == (pytest.approx(18.0), 3)
+    for changes, words in (
+        ({"flow.shape.length_m": 15.0}, "needs exactly one of squares and length_m"),
+        ({"flow.shape.squares": None}, "needs exactly one of squares and length_m"),
+        ({"flow.shape.squares": None, "flow.shape.length_m": 5.0}, "length_m = 5 must be at least twice depth_m, 6"),
+    ):
+        with pytest.raises(ScenarioError, match=words):
+            case_1.replaced(changes)
 
 
 @pytest.mark.parametrize(

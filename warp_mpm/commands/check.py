@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,24 +13,37 @@ from analytic.command_line import BAD_INPUT, complain, tell
 
 def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", help="Print what was found as JSON: for each file its problems, notes and numbers."),
+    ] = False,
 ) -> None:
     """Check scenario files and tell what they describe; nothing is run or written."""
     from warp_mpm.caveats import scene_caveats
-    from warp_mpm.description import described, described_domain, described_material
+    from warp_mpm.description import described, described_domain, described_material, numbers
     from warp_mpm.regime import described_regime
     from warp_mpm.scenario import Scenario
     from warp_mpm.scenario_errors import ScenarioError
 
-    failed = False
+    found: list[dict[str, Any]] = []
     for file in files:
         try:
             scenario = Scenario.load(file)
-            notes = [f"Note: {sentence}" for sentence in scene_caveats(scenario)]
-            card = [*described(scenario), described_material(scenario), described_domain(scenario)]
-            told = [*card, described_regime(scenario), *notes]
-            tell("\n  ".join([f"{file}: {scenario.title}", *filter(None, told)]))
         except ScenarioError as error:
-            failed = True
-            complain(str(error))
-    if failed:
+            found.append({"file": str(file), "valid": False, "problems": error.problems})
+            if not as_json:
+                complain(str(error))
+            continue
+        notes = scene_caveats(scenario)
+        found.append(
+            {"file": str(file), "valid": True, "problems": [], "title": scenario.title, "notes": notes}
+            | {"numbers": numbers(scenario)}
+        )
+        if not as_json:
+            card = [*described(scenario), described_material(scenario), described_domain(scenario)]
+            told = [*card, described_regime(scenario), *(f"Note: {sentence}" for sentence in notes)]
+            tell("\n  ".join([f"{file}: {scenario.title}", *filter(None, told)]))
+    if as_json:
+        typer.echo(json.dumps(found, indent=2, ensure_ascii=False))
+    if not all(one["valid"] for one in found):
         raise typer.Exit(BAD_INPUT)

@@ -58,6 +58,21 @@ def agreed(question: str) -> bool:
     return typer.confirm(question, err=True)
 
 
+def print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    """Names and values, one below the other."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 180  # a file has no edge to fit to
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, value in rows:
+        table.add_row(Text(name, style="dim"), Text(value))
+    console.print(table)
+
+
 def times_of(text: str | None) -> tuple[float, ...] | None:
     """Times [s] from a list with commas; None where none is given.
 

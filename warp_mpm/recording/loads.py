@@ -100,14 +100,11 @@ class LoadsRecorder:
             OSError: it could not be written; those before are kept.
         """
         window = simulation.window()
-        taken = window.taken
+        mean, before = mean_on_slots(window, self._before)
         with failures_of_the_disk():
             if self._rows == 0:
                 self._lay_out(simulation)
             assert self._file is not None
-            before, sums = self._before if self._before is not None else (window.time, taken)
-            elapsed = window.time - before
-            mean = ((taken - sums) / elapsed if elapsed > 0.0 else np.zeros_like(taken)).reshape(-1, at.SLOT_SIZE)
             for stretch in simulation.slots.stretches:
                 rows = pressures(mean[stretch.slots], stretch, simulation.scenario)
                 for name, values in rows.items():
@@ -117,7 +114,7 @@ class LoadsRecorder:
             self._rows += 1
             self._file.attrs.modify("rows", self._rows)
             self._file.flush()
-        self._before = (window.time, taken)
+        self._before = before
 
     def _lay_out(self, simulation: Any) -> None:
         """Create every group and data set, with room for all rows."""
@@ -147,6 +144,20 @@ class LoadsRecorder:
             finally:
                 file, self._file = self._file, None
                 file.close()
+
+
+def mean_on_slots(window: Any, before: tuple[float, np.ndarray] | None) -> tuple[np.ndarray, tuple[float, np.ndarray]]:
+    """Mean impulses [slots, SLOT_SIZE] since a mark, over the time [N/m], nil without one; and the mark for the next.
+
+    Args:
+        window: of the simulation, now.
+        before: time and impulses of the mark.
+    """
+    taken = window.taken
+    time, sums = before if before is not None else (window.time, taken)
+    elapsed = window.time - time
+    mean = ((taken - sums) / elapsed if elapsed > 0.0 else np.zeros_like(taken)).reshape(-1, at.SLOT_SIZE)
+    return mean, (window.time, taken)
 
 
 def pressures(mean: np.ndarray, stretch: Stretch, scenario: Any) -> dict[str, np.ndarray]:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.quantities import TIME_SERIES
+from warp_mpm.recording.loads import mean_on_slots, pressures
 from warp_mpm.recording.schedule import Schedule
+from warp_mpm.simulator.bodies.loads import Stretch
 from warp_mpm.snapshot import Snapshot, snapshot_of
 
 Array = NDArray[np.float64]
@@ -53,6 +55,39 @@ class SeriesInMemory:
         keys = self.samples[0] if self.samples else {}
         known = {key: TIME_SERIES[key].name if key in TIME_SERIES else key for key in keys}
         return {name: np.array([sample[key] for sample in self.samples]) for key, name in known.items()}
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+class LoadsInMemory:
+    """Keeps mean pressures on the slots of the barrier, as in `loads.h5`."""
+
+    def __init__(self, schedule: Schedule):
+        self.schedule = schedule
+        self.times: list[float] = []
+        self.stretches: tuple[Stretch, ...] = ()
+        """Of the slots, as of the simulation."""
+        self._rows: list[dict[str, dict[str, Array]]] = []
+        self._before: tuple[float, Array] | None = None
+
+    def record(self, simulation: Any) -> None:
+        """Keep one row."""
+        window = simulation.window()
+        mean, self._before = mean_on_slots(window, self._before)
+        self.stretches = tuple(simulation.slots.stretches)
+        self.times.append(simulation.time)
+        self._rows.append(
+            {
+                stretch.surface: pressures(mean[stretch.slots], stretch, simulation.scenario)
+                for stretch in self.stretches
+            }
+        )
+
+    def pressures(self, surface: str) -> dict[str, Array]:
+        """Arrays [times, slots] of a surface in Pa, by their names."""
+        rows = [row[surface] for row in self._rows]
+        return {name: np.array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
 
     def close(self) -> None:
         """There is nothing to close."""

@@ -25,20 +25,40 @@ THINNEST = 1e-12
 
 
 class FrontAndTail(Model):
-    """The paper's flow: a front at 45°, `squares` squares of the flow's depth, a tail of three depths."""
+    """The paper's flow: a front at 45°, `squares` squares of the flow's depth, a tail of three depths.
+
+    Its length may be given in metres in place of a whole number of squares; exactly one of the two is given.
+    """
 
     kind: Literal["front_and_tail"]
     depth_m: Length
     """Flow depth h."""
-    squares: Annotated[int, Field(ge=0, le=100_000), AsWhole]
+    squares: Annotated[int, Field(ge=0, le=100_000), AsWhole] | None = None
     """Number i of squares between front and tail. Volume (2 + i) h² per metre of width."""
+    length_m: Length | None = None
+    """Length L of the box of the flow's volume and depth, at least 2 h, in place of `squares`. Volume L h."""
     distance_m: Annotated[float, Field(ge=0.0, le=1e6)]
     """Distance d from the front's toe to the barrier's toe."""
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if (self.squares is None) == (self.length_m is None):
+            raise ValueError("needs exactly one of squares and length_m")
+        if self.length_m is not None and self.length_m < 2.0 * self.depth_m * (1.0 - 1e-9):
+            raise ValueError(
+                f"length_m = {self.length_m:g} must be at least twice depth_m, {2.0 * self.depth_m:g}: "
+                "front and tail alone have as much"
+            )
+        return self
 
     @property
     def polygon(self) -> geometry.Polygon:
         """Vertices [V, 2] in metres."""
-        return geometry.front_and_tail(self.depth_m, self.squares, self.distance_m)
+        if self.squares is not None:
+            return geometry.front_and_tail(self.depth_m, self.squares, self.distance_m)
+        assert self.length_m is not None
+        between = self.length_m / self.depth_m - 2.0
+        return geometry.front_and_tail(self.depth_m, between if between > 1e-9 else 0, self.distance_m)
 
 
 class FlowPolygon(Model):

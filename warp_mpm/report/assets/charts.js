@@ -2,7 +2,7 @@
 
 const INK = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#6e6e6e", "#e69f00"];
 const DASHES = {solid: "", faint: "", dashed: "7 4", dotted: "2 3"};
-const CHART = {width: 620, height: 240, left: 62, right: 10, top: 8, bottom: 34};
+const CHART = {width: 620, least: 300, height: 240, left: 62, right: 10, top: 8, bottom: 34};
 
 function svgElement(name, attributes, parent) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -32,7 +32,9 @@ function makeChart(parent, chart, end, limits, tip, onTime) {
   box.innerHTML = "<h3></h3>";
   box.firstChild.textContent = `${chart.title} [${chart.unit}]`;
   parent.appendChild(box);
-  const {width, height, left, right, top, bottom} = CHART;
+  const {height, left, right, top, bottom} = CHART;
+  // As wide as its place, so that words keep their size beside three others and on a telephone.
+  const width = Math.max(CHART.least, Math.min(CHART.width, box.clientWidth || CHART.width));
   const svg = svgElement("svg", {viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": chart.title}, box);
   const px = t => left + t / end * (width - left - right);
   const py = v => height - bottom - (v - limits[0]) / (limits[1] - limits[0]) * (height - top - bottom);
@@ -43,7 +45,7 @@ function makeChart(parent, chart, end, limits, tip, onTime) {
     const element = svgElement("text", {x, y, "text-anchor": anchor, "font-size": 12, fill: "#61656b"}, svg);
     element.textContent = words;
   };
-  const xStep = niceStep(end, 7), yStep = niceStep(limits[1] - limits[0], 5);
+  const xStep = niceStep(end, Math.max(3, width / 90)), yStep = niceStep(limits[1] - limits[0], 5);
   for (let k = 0; k * xStep <= end * (1 + 1e-9); k++) {
     svgElement("line", {x1: px(k * xStep), x2: px(k * xStep), y1: top, y2: height - bottom, stroke: "#ecebe7"}, svg);
     text(px(k * xStep), height - bottom + 15, formatTick(k * xStep, xStep), "middle");

@@ -33,16 +33,21 @@ function column(parent, run, className) {
   return box;
 }
 
+function heading(words, scope) {
+  return Object.assign(document.createElement("th"), {textContent: words, scope});
+}
+
 function table(target, rows, header, differing) {
   // rows: [name, [a cell of each run]]
   const element = document.createElement("table");
   if (header) {
     const row = element.insertRow();
-    ["", ...header].forEach(words => row.appendChild(Object.assign(document.createElement("th"), {textContent: words})));
+    row.insertCell();  // above the names of the rows
+    header.forEach(words => row.appendChild(heading(words, "col")));
   }
   for (const [name, cells] of rows) {
     const row = element.insertRow();
-    row.appendChild(Object.assign(document.createElement("th"), {textContent: name}));
+    row.appendChild(heading(name, "row"));
     cells.forEach(cell => { row.insertCell().textContent = cell === undefined ? "–" : cell; });
     if (differing && new Set(cells).size > 1) row.className = "differs";
   }
@@ -69,7 +74,7 @@ function fillTables() {
   for (const run of runs) {
     const box = column(by("scenes"), run, "scene");
     box.insertAdjacentHTML("beforeend", run.scene);
-    for (const note of run.notes) box.appendChild(Object.assign(document.createElement("p"), {className: "hint", textContent: note}));
+    for (const note of run.notes) box.appendChild(Object.assign(document.createElement("p"), {className: "caption", textContent: note}));
   }
   for (const run of runs) if (run.loads) {
     by("loads").hidden = false;
@@ -279,13 +284,14 @@ function drawStills(clouds, home) {
     by("still-rows").appendChild(row);
     for (const cloud of clouds) {
       const box = column(row, cloud.run), frame = cloud.frameAt(time), index = cloud.fieldIndex(name);
-      const caption = Object.assign(document.createElement("p"), {className: "hint"});
+      const caption = Object.assign(document.createElement("p"), {className: "caption"});
       const shift = cloud.points.shifts[frame];
       let most = 0;
       if (index >= 0) for (const value of cloud.raw(frame, 2 + index)) most = Math.max(most, cloud.toValue(2 + index, value));
       caption.textContent = `t = ${cloud.points.times[frame].toFixed(2)} s, greatest ${field.label} ` +
         `${most.toFixed(0)} ${field.unit}` + (shift ? `, barrier moved ${shift.toFixed(2)} m` : "");
-      const canvas = Object.assign(document.createElement("canvas"), {className: "still"});
+      const canvas = Object.assign(document.createElement("canvas"), {className: "still", role: "img"});
+      canvas.setAttribute("aria-label", `${cloud.run.name}: ${caption.textContent}`);
       box.append(caption, canvas);
       pictures.push(() => drawCloud(canvas, new View(home), cloud, frame, index, low, high, colours));
     }
