@@ -175,9 +175,15 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     if motion.kind == "prescribed":
         raise SceneError(f"{name}: barrier.motion.kind is {motion.kind!r}, the closed form knows fixed and sliding.")
     velocity_x, velocity_y = flow.velocity_m_per_s
+    remarks = []
+    if flow.inflow is not None:
+        velocity_x = max(velocity_x, flow.inflow.greatest_speed)
+        remarks.append("Of a flow that arrives the greatest depth and velocity are taken, and all of its volume.")
+    if flow.deposits:
+        remarks.append("The deposits are left out.")
     if velocity_x <= 0:
         raise SceneError(f"{name}: flow.velocity_m_per_s[0] is {velocity_x:g}, the flow must move towards the barrier.")
-    remarks = slips(scenario)
+    remarks += slips(scenario)
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
     if scenario.ground is not None and scenario.ground.friction != 0:

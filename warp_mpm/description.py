@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
+from warp_mpm.scenario.inflow import surges_of
 from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
 
 
@@ -16,13 +17,34 @@ def described(scenario: Scenario) -> list[str]:
         speed += f" (Fr {flow.speed / (scenario.gravity.acceleration_m_per_s2 * flow.depth) ** 0.5:.2f})"
     slope = "no ground" if ground is None else f"slope {tilt:g}°, ground friction {ground.friction:g}"
     material = flow.formulation.replace("_", "-")
-    points = flow.volume / numerics.spacing_m**2 * numerics.points_per_cell
+    points = (flow.volume + flow.deposited_volume) / numerics.spacing_m**2 * numerics.points_per_cell
     return [
         f"{material} flow of {flow.volume:g} m³/m, {flow.volume * flow.material.density:,.0f} kg/m, "
         f"{flow.depth:g} m deep, {speed}; {slope}",
+        *_arriving(scenario),
         f"{_barrier(scenario.barrier)}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
         f"{numerics.spacing_m:g} m grid, {numerics.precision}",
     ]
+
+
+def _arriving(scenario: Scenario) -> list[str]:
+    """What arrives and what lies there, in a line; none where neither does."""
+    flow, words = scenario.flow, []
+    if flow.inflow is not None:
+        inflow = flow.inflow
+        surges = len(surges_of(inflow))
+        words.append(
+            f"{inflow.volume:.4g} m³/m arrive at x = {inflow.x_m:g} m from t = {inflow.times[0]:g} to "
+            f"{inflow.times[-1]:g} s, in {surges} surge{'' if surges == 1 else 's'}, up to "
+            f"{inflow.greatest_depth:.3g} m deep and {inflow.greatest_speed:.3g} m/s fast"
+        )
+        late = inflow.volume - inflow.volume_until(scenario.output.end_time_s)
+        if late > 1e-9 * inflow.volume:
+            words.append(f"of it {late:.4g} m³/m after the end of the run")
+    if flow.deposits:
+        words.append(f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of "
+                     f"{flow.deposited_volume:.4g} m³/m")
+    return ["; ".join(words)] if words else []
 
 
 def described_material(scenario: Scenario) -> str:

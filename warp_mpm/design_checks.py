@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from analytic.empirical import reflected_depth_ratio
 from analytic.force_record import RESIDUAL_SHARE, moving_mean
 from warp_mpm import geometry
+from warp_mpm.arrival_figures import departed_volume
 from warp_mpm.quantities import Quantity
 from warp_mpm.scenario import Design, Scenario, Sliding, Trapezoid
 
@@ -302,7 +303,7 @@ def boulder_force(scenario: Scenario, design: Design) -> float:
 def _overtopping(scenario: Scenario, figures: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
     assert scenario.barrier is not None
     found: dict[str, tuple[float | None, float | None]] = {}
-    beyond, left = figures.get("overtopped_volume"), figures.get("left_volume")
+    beyond, left = figures.get("overtopped_volume"), departed_volume(scenario, figures)
     if beyond is not None:
         volume = float(beyond) + max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
         found["overtopped_share"] = (volume / scenario.flow.volume, None)

@@ -72,6 +72,13 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
             {"flow.material.porosity_update": not porosity} if two_phase else {},
         ),
+        Rule(
+            "arriving",
+            flow.inflow is not None,
+            "all of the flow is there at the start"
+            if flow.inflow is None
+            else f"flow.inflow brings {flow.inflow.volume:.4g} m³/m",
+        ),
     ]
 
 

@@ -55,6 +55,8 @@ class Effects:
     """Some places of contact share nodes, or act on a body that slides: their impulses are found together."""
     passing: bool = False
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
+    arriving: bool = False
+    """Some of the flow arrives at a section during the run."""
 
     @property
     def liquid(self) -> bool:
@@ -114,6 +116,7 @@ class Effects:
                 "driven",
                 "joined",
                 "passing",
+                "arriving",
             )
             if getattr(self, name)
         ]

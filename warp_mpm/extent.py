@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.scenario import Prescribed, Scenario, Sliding, Trapezoid, Wall
+from warp_mpm.scenario.inflow import APPROACH
 
 LARGEST_FITTED_GRID = 2_000_000
 """Most nodes that a grid fitted to the scene gets; beyond, the fitted edges move in and what leaves is counted."""
@@ -70,7 +71,7 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
         vertices: of the outlines of bodies beside the scenario's, [V, 2] each [m].
     """
     spacing, domain, flow = scenario.numerics.spacing_m, scenario.domain, scenario.flow
-    outline = flow.polygon
+    outline = np.concatenate(flow.outlines)
     x_low, y_low = (float(low) for low in outline.min(axis=0))
     x_high, y_high = (float(high) for high in outline.max(axis=0))
     length = x_high - x_low
@@ -100,11 +101,15 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
     elif scenario.ground is not None and scenario.ground.friction > 0.0:
         # A barrier that the flow pushes goes where the flow goes, but for a tail that the ground brings to rest.
         behind = max(behind, travel.downstream + length)
+    if flow.inflow is not None:
+        # Upstream of the section there is nothing but what is about to arrive; what comes back over it leaves.
+        x_low = min(x_low, flow.inflow.x_m) - APPROACH * spacing - travel.downstream
+        behind = 0.0
     ahead = reach + travel.upstream
     if barrier is not None and driven and isinstance(barrier.shape, Wall):
         # Nothing flows there; behind a wall at rest the same room costs memory, and no time.
         ahead = BEHIND_A_WALL * spacing
-    heap = heaped_height(scenario)
+    heap = max(heaped_height(scenario), _filled_height(scenario))
     highest = max(y_high, heap) if math.isfinite(heap) else y_high
     if scenario.ground is not None:
         bottom = 0.0
@@ -139,9 +144,20 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
     return Extent(edges, wanted, fast)
 
 
+def _filled_height(scenario: Scenario) -> float:
+    """Height [m] to which what arrives may fill the room between the section and a barrier, up to the height at which
+    it goes over the barrier or back over the section."""
+    inflow, barrier = scenario.flow.inflow, scenario.barrier
+    if inflow is None or barrier is None or not inflow.x_m < 0.0:
+        return 0.0
+    crest = barrier.shape.base_crest_height[2] if isinstance(barrier.shape, Trapezoid) else math.inf
+    filled = 2.0 * (scenario.flow.volume + scenario.flow.deposited_volume) / -inflow.x_m
+    return min(filled, crest, inflow.base_m + 2.0 * inflow.greatest_depth) + inflow.greatest_depth
+
+
 def _height_of_fall(scenario: Scenario) -> float:
     """The flow's depth [m]; of a flow that begins above the ground, the height from which it falls."""
-    depth, top = scenario.flow.depth, float(scenario.flow.polygon[:, 1].max())
+    depth, top = scenario.flow.depth, float(np.concatenate(scenario.flow.outlines)[:, 1].max())
     return top if scenario.ground is not None and top > depth * (1.0 + 1e-6) else depth
 
 
@@ -159,7 +175,7 @@ def barrier_travel(scenario: Scenario) -> Travel:
     assert mass is not None
     held = barrier.motion.base_friction_coefficient * abs(gy)
     # The momentum of a flow that is all as fast as its front, shared with the barrier; friction at its base stops it.
-    flow_mass = flow.volume * flow.material.density
+    flow_mass = (flow.volume + flow.deposited_volume) * flow.material.density
     front = flow.speed + 2.0 * math.sqrt(abs(gy) * flow.depth)
     pushed = flow_mass / (flow_mass + mass) * front
     slowed = held - gx
@@ -219,7 +235,7 @@ def domain_caveats(scenario: Scenario) -> list[str]:
         )
     if scenario.barrier is None or not isinstance(scenario.barrier.motion, Prescribed):
         return found
-    outline = scenario.flow.polygon
+    outline = np.concatenate(scenario.flow.outlines)
     x_low, x_high = float(outline[:, 0].min()), float(outline[:, 0].max())
     for side, edge, place, way, cut in (
         ("left", domain.left_edge, domain.left_m, travel.downstream, x_low),

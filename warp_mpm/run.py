@@ -7,7 +7,7 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.arrival_figures import arrival_figures, with_what_arrives
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
@@ -126,7 +127,7 @@ def run_in_memory(
         "wall_time": time.perf_counter() - started,
     }
     columns = series.series()
-    summary = summarize(scenario, columns, snapshots.snapshots, _of_the_run(record))
+    summary = _summary(scenario, columns, snapshots.snapshots, record)
     summary["notes"] = [*scene_caveats(scenario), *run_caveats(record, summary)]
     return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary)
 
@@ -352,12 +353,19 @@ def evaluate(path: str | Path) -> dict[str, Any]:
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
     with results.snapshots as snapshots:
-        summary = summarize(results.scenario, results.time_series, snapshots, _of_the_run(record))
+        summary = _summary(results.scenario, results.time_series, snapshots, record)
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
         _draw(results, path)
     return summary
+
+
+def _summary(
+    scenario: Scenario, series: Mapping[str, NDArray[np.float64]], snapshots: Any, record: dict[str, Any]
+) -> dict[str, Any]:
+    summary = summarize(scenario, with_what_arrives(scenario, series), snapshots, _of_the_run(record))
+    return summary | arrival_figures(scenario, series, summary)
 
 
 def _draw(results: Results, path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from analytic.command_line import refusals
+from warp_mpm.shipped import tables_of
 
 
 def scenarios(
@@ -64,6 +65,8 @@ def _copy(files: dict[str, Path], folder: Path, *, force: bool) -> tuple[int, in
         OSError: the folder cannot be written to.
     """
     wanted = {folder / f"{name}.json": file.read_bytes() for name, file in files.items()}
+    for name, file in files.items():
+        wanted |= {(folder / name).with_name(beside.name): beside.read_bytes() for beside in tables_of(file)}
     new = {target: text for target, text in wanted.items() if not target.exists() or target.read_bytes() != text}
     for target in new:
         if target.exists() and not force:

@@ -6,6 +6,7 @@ import warp as wp
 
 from .elementary import make_elementary
 from .layout import (
+    INSIDE,
     LEDGER_ELASTIC,
     LEDGER_GRAVITATIONAL,
     LEDGER_KINETIC,
@@ -88,7 +89,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         # Each thread sums for itself and adds to the common sums once.
         p = wp.tid()
         while p < points.inside.shape[0]:
-            if read(points.inside, p) != 0:
+            if read(points.inside, p) == wp.static(INSIDE):
                 reference = read(points.reference_volume, p)
                 volume = read(points.volume, p)
                 v = read(points.velocity, p)

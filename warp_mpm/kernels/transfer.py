@@ -116,7 +116,7 @@ def make_transfer(
         compression positive: audit 3.4, action and reaction between the phases included.
         """
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) <= 0:
             return
         x = read(points.position, p)
         shift = F(grid.shift[0])
@@ -256,7 +256,7 @@ def make_transfer(
     def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
         """Velocities and velocity gradient from the nodes to the points; volume strain rates to the corners."""
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) <= 0:
             return
         x = read(points.position, p)
         shift = F(grid.shift[0])

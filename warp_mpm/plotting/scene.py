@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.patches import Rectangle
 
+from warp_mpm.geometry import Polygon
 from warp_mpm.plotting.style import BARRIER, BLUE, EDGE, GREY, GROUND, heading
 from warp_mpm.scenario import Scenario, Trapezoid, Wall
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
@@ -24,11 +26,20 @@ STEP, LABEL = 0.26, 3.6
 """From one line of measures to the next [inches]; the width of a label in such steps."""
 
 
+FLOW, DEPOSIT = "#9CC7E3", "#C9B79C"
+
+SHOWN_UPSTREAM = 3.0
+"""How much of what arrives is shown upstream of the section, over its greatest depth."""
+
+
 def scene(scenario: Scenario) -> Figure:
     """Outline of flow and barrier with depth, length, distance, widths, height and face angle; gravity where tilted."""
-    flow = scenario.flow.polygon
+    flow = np.concatenate(scenario.flow.outlines)
     left, right = float(flow[:, 0].min()), float(flow[:, 0].max())
     bottom, high = min(0.0, float(flow[:, 1].min())), float(flow[:, 1].max())
+    inflow = scenario.flow.inflow
+    if inflow is not None:
+        left = min(left, inflow.x_m - SHOWN_UPSTREAM * inflow.greatest_depth)
     shape = scenario.barrier.shape if scenario.barrier is not None else None
     tilted = scenario.gravity.tilt_deg != 0.0 and scenario.gravity.acceleration_m_per_s2 > 0.0
     # Room for the measures around what is drawn to scale [steps].
@@ -39,8 +50,8 @@ def scene(scenario: Scenario) -> Figure:
     if isinstance(shape, Trapezoid):
         base, _, height = shape.base_crest_height
         right, high = max(right, base), max(high, height)
-    if scenario.flow.speed > 0.0:
-        above += 2.5 * max(0.0, scenario.flow.velocity_m_per_s[1] / scenario.flow.speed)
+    if scenario.flow.velocity_m_per_s[1] > 0.0:
+        above += 2.5 * scenario.flow.velocity_m_per_s[1] / math.hypot(*scenario.flow.velocity_m_per_s)
     if tilted:
         above += 3.0
 
@@ -59,8 +70,14 @@ def scene(scenario: Scenario) -> Figure:
     if scenario.ground is not None:
         panel.axhspan(floor, 0.0, color=GROUND, linewidth=0.0)
         panel.axhline(0.0, color=GREY, linewidth=0.8)
-    panel.add_patch(PolygonPatch(flow, facecolor="#9CC7E3", edgecolor=BLUE))
-    _flow_measures(panel, scenario, bottom, step)
+    if scenario.flow.shape is not None:
+        panel.add_patch(PolygonPatch(scenario.flow.polygon, facecolor=FLOW, edgecolor=BLUE))
+        _flow_measures(panel, scenario, bottom, step)
+    for deposit in scenario.flow.deposits:
+        panel.add_patch(PolygonPatch(deposit.shape.polygon, facecolor=DEPOSIT, edgecolor=EDGE))
+        _deposit_measures(panel, deposit.shape.polygon, bottom, step)
+    if inflow is not None:
+        _inflow_measures(panel, scenario, bottom, step)
     if isinstance(shape, Trapezoid):
         panel.add_patch(PolygonPatch(shape.polygon, facecolor=BARRIER, edgecolor=EDGE))
         _barrier_measures(panel, shape, bottom, step)
@@ -105,7 +122,7 @@ def _facts(scenario: Scenario) -> str:
 def _flow_measures(panel: Axes, scenario: Scenario, bottom: float, step: float) -> None:
     flow = scenario.flow.polygon
     (tail, lowest), (front, highest) = flow.min(axis=0), flow.max(axis=0)
-    speed = scenario.flow.speed
+    speed = math.hypot(*scenario.flow.velocity_m_per_s)
     if speed > 0.0:
         along_x, along_y = (2.5 * step * component / speed for component in scenario.flow.velocity_m_per_s)
         start = (float(flow[:, 0].mean()) - 0.5 * along_x, highest + step)
@@ -117,6 +134,35 @@ def _flow_measures(panel: Axes, scenario: Scenario, bottom: float, step: float) 
     _measure(panel, (deepest, lowest), (deepest, highest), f"h = {scenario.flow.depth:g} m", step)
     if scenario.barrier is not None and front < -1e-9:
         _measure(panel, (front, bottom - 2.3 * step), (0.0, bottom - 2.3 * step), f"d = {-front:.3g} m")
+
+
+def _deposit_measures(panel: Axes, outline: Polygon, bottom: float, step: float) -> None:
+    (left, _), (right, high) = outline.min(axis=0), outline.max(axis=0)
+    _measure(panel, (left, bottom - step), (right, bottom - step), f"{right - left:.3g} m")
+    panel.text(0.5 * (left + right), high + 0.2 * step, f"deposit, {high:.3g} m", ha="center", va="bottom", fontsize=9)
+
+
+def _inflow_measures(panel: Axes, scenario: Scenario, bottom: float, step: float) -> None:
+    """The section with the depth that arrives there at most, and what else is to be known of the inflow."""
+    inflow = scenario.flow.inflow
+    assert inflow is not None
+    x, low, depth = inflow.x_m, inflow.base_m, inflow.greatest_depth
+    length = SHOWN_UPSTREAM * depth
+    panel.add_patch(Rectangle((x - length, low), length, depth, facecolor=FLOW, edgecolor="none", alpha=0.5))
+    panel.plot([x, x], [low, low + depth], color=BLUE, linewidth=1.6)
+    height = low + 0.5 * depth
+    panel.annotate(
+        "", (x + 2.0 * step, height), (x - 0.5 * step, height),
+        arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6},
+    )  # fmt: skip
+    first, last = inflow.times[0], inflow.times[-1]
+    words = (
+        f"arrives from t = {first:.3g} to {last:.3g} s:\n{inflow.volume:.3g} m³/m, h ≤ {depth:.3g} m, "
+        f"v ≤ {inflow.greatest_speed:.3g} m/s"
+    )
+    panel.text(x - length, low + depth + 0.3 * step, words, fontsize=9, va="bottom")
+    if scenario.barrier is not None:
+        _measure(panel, (x, bottom - 2.3 * step), (0.0, bottom - 2.3 * step), f"{-x:.3g} m")
 
 
 def _barrier_measures(panel: Axes, shape: Trapezoid, bottom: float, step: float) -> None:

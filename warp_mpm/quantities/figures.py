@@ -169,9 +169,14 @@ _ROWS = (
         "volume overtopped", short="beyond",
     ),
     Figure(
+        "inflow_volume", "m3/m", "what has arrived at the section of the inflow until the end, at the flow's density",
+        "volume that has arrived", short="arrived", needs=("inflow_mass",),
+    ),
+    Figure("deposited_volume", "m3/m", "what lay there at the start as a deposit", "volume deposited before"),
+    Figure(
         "mass_error", "-",
         "greatest change of the mass of both phases, inside and departed together, over the initial mass",
-        "error of mass", needs=("solid_mass", "liquid_mass", "left_mass"),
+        "error of mass", needs=("solid_mass", "liquid_mass", "left_mass", "inflow_mass"),
     ),
     Figure(
         "momentum_error", "-",
@@ -190,7 +195,7 @@ _ROWS = (
         "energy created",
         needs=(
             *("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy"),
-            *("left_energy", "barrier_work", "seepage_work"),
+            *("left_energy", "barrier_work", "seepage_work", "inflow_energy"),
         ),
     ),
     Figure("wall_time", "s", "wall time of the run, its preparation left out", "wall time"),

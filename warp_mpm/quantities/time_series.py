@@ -39,6 +39,11 @@ def two_phases(scenario: Any) -> bool:
     return scenario.flow.formulation == "two_phase"
 
 
+def arriving(scenario: Any) -> bool:
+    """Flows that arrive at a section during the run."""
+    return scenario.flow.inflow is not None
+
+
 def ended_barrier(scenario: Any) -> bool:
     """Scenes whose barrier has a base with two ends."""
     return barrier(scenario) and scenario.barrier.shape.kind == "trapezoid"
@@ -63,12 +68,13 @@ def _left(entry: str) -> Reader:
 
 
 def _residual(axis: str) -> Reader:
-    """Momentum, less its start and gravity's, plus what left and what the flow gave to the bodies."""
+    """Momentum, less its start, gravity's and an inflow's, plus what left and what the flow gave to the bodies."""
     place = "xy".index(axis)
 
     def read(now: Any) -> float:
         residual = now.ledger(f"momentum_{axis}") - now.initial_momentum[place]
         residual -= now.balance(f"gravity_impulse_{axis}")
+        residual -= now.inflow(f"momentum_{axis}")
         residual += now.left(f"momentum_{axis}")
         return residual + sum(now.impulses[place::2])
 
@@ -280,6 +286,28 @@ _ROWS = (
     Sampled(
         "left_energy", "J/m", "kinetic, potential and elastic energy that has left the domain with the mass",
         "energy that left the domain", read=_left("energy"), of_points=False,
+    ),
+    Sampled(
+        "inflow_mass", "kg/m", "mass of both phases that has arrived at the section of the inflow since t = 0",
+        "mass that has arrived", read=lambda now: now.inflow("solid_mass") + now.inflow("liquid_mass"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_momentum_x", "N s/m",
+        "momentum along x that the inflow has brought since t = 0, with its mass and by its thrust at the section",
+        "horizontal momentum that has arrived", read=lambda now: now.inflow("momentum_x"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_momentum_y", "N s/m",
+        "momentum along y that the inflow has given to the flow since t = 0, through the section",
+        "vertical momentum that has arrived", read=lambda now: now.inflow("momentum_y"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_energy", "J/m",
+        "kinetic and potential energy that the inflow has brought since t = 0, and the work of its thrust",
+        "energy that has arrived", read=lambda now: now.inflow("energy"), there=arriving, of_points=False,
     ),
     Sampled(
         "time_step", "s", "time step at the end of the interval", "time step",

@@ -8,6 +8,7 @@ moves toward +x. All forces, masses and volumes are per metre of width.
 from warp_mpm.scenario.barrier import Barrier, Fixed, Prescribed, Sliding, SurfaceFriction, Trapezoid, Wall
 from warp_mpm.scenario.design import Boulder, Design
 from warp_mpm.scenario.flow import (
+    Deposit,
     DryFlow,
     Flow,
     FlowPolygon,
@@ -18,6 +19,7 @@ from warp_mpm.scenario.flow import (
     UndrainedFlow,
     UndrainedMaterial,
 )
+from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.scene import Scenario, json_schema
 from warp_mpm.scenario.settings import STANDARD_GRAVITY, Domain, Gravity, Ground, Numerics, Output
 
@@ -25,6 +27,7 @@ __all__ = [
     "STANDARD_GRAVITY",
     "Barrier",
     "Boulder",
+    "Deposit",
     "Design",
     "Domain",
     "DryFlow",
@@ -34,6 +37,7 @@ __all__ = [
     "FrontAndTail",
     "Gravity",
     "Ground",
+    "Inflow",
     "Numerics",
     "Output",
     "Prescribed",

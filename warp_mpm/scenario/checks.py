@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mpm import geometry
-from warp_mpm.scenario.barrier import Sliding, Trapezoid, Wall
+from warp_mpm.scenario.barrier import Prescribed, Sliding, Trapezoid, Wall
+from warp_mpm.scenario.inflow import APPROACH
 
 if TYPE_CHECKING:
     from warp_mpm.scenario.scene import Scenario
@@ -33,7 +34,8 @@ BYTES_PER_POINT = 500
 
 def problems(scenario: Scenario) -> list[str]:
     """All that makes the scene impossible; empty where nothing does."""
-    found = [*_misplaced_flow(scenario), *_impossible_domain(scenario), *_excessive_size(scenario)]
+    found = [*_misplaced_flow(scenario), *_misplaced_inflow(scenario), *_misplaced_deposits(scenario)]
+    found += [*_impossible_domain(scenario), *_excessive_size(scenario)]
     barrier = scenario.barrier
     if scenario.ground is None and barrier is not None and isinstance(barrier.motion, Sliding):
         found.append("ground = null is not allowed with a sliding barrier, which needs a base to slide on")
@@ -63,13 +65,19 @@ def problems(scenario: Scenario) -> list[str]:
 
 
 def _misplaced_flow(scenario: Scenario) -> list[str]:
-    outline = scenario.flow.polygon
+    if scenario.flow.shape is None:
+        return []
+    return _misplaced(scenario, "flow.shape", scenario.flow.shape.polygon)
+
+
+def _misplaced(scenario: Scenario, name: str, outline: geometry.Polygon) -> list[str]:
+    """A body of flow below the ground or inside the barrier."""
     problems = []
     lowest = float(outline[:, 1].min())
     # A hair below is rounding of the user's own arithmetic.
     hair = 1e-9 * max(1.0, float(np.abs(outline).max()))
     if scenario.ground is not None and lowest < -hair:
-        problems.append(f"flow.shape reaches y = {lowest:g} m; it must stay on or above the ground, y >= 0")
+        problems.append(f"{name} reaches y = {lowest:g} m; it must stay on or above the ground, y >= 0")
     if scenario.barrier is not None:
         if isinstance(scenario.barrier.shape, Wall):
             inside = geometry.clip_half_plane(outline, (-1.0, 0.0), 0.0)
@@ -78,15 +86,94 @@ def _misplaced_flow(scenario: Scenario) -> list[str]:
         overlap = geometry.area(inside) if len(inside) else 0.0
         if overlap > hair * scenario.flow.depth:
             problems.append(
-                f"flow.shape lies inside the barrier by {overlap:.3g} m³/m; it must lie outside "
+                f"{name} lies inside the barrier by {overlap:.3g} m³/m; it must lie outside "
                 "(the barrier's toe is at x = 0 and its body at x >= 0)"
             )
     return problems
 
 
+def _misplaced_deposits(scenario: Scenario) -> list[str]:
+    """Deposits below the ground, inside the barrier, or where something else lies."""
+    flow, spacing, problems = scenario.flow, scenario.numerics.spacing_m, []
+    bodies = [(f"flow.deposits[{place}]", deposit.shape.polygon) for place, deposit in enumerate(flow.deposits)]
+    for name, outline in bodies:
+        problems += _misplaced(scenario, name, outline)
+        volume = geometry.area(outline)
+        if volume / spacing**2 * scenario.numerics.points_per_cell < 1.0:
+            problems.append(
+                f"numerics.spacing_m = {spacing:g} leaves less than one material point for {name} of {volume:.3g} "
+                "m³/m; it must be smaller"
+            )
+    if flow.shape is not None:
+        bodies.append(("flow.shape", flow.shape.polygon))
+    for place, (name, outline) in enumerate(bodies):
+        for other, another in bodies[place + 1 :]:
+            if _overlap(outline, another, spacing):
+                problems.append(f"{name} and {other} lie in one place; they must not overlap")
+    return problems
+
+
+def _overlap(one: geometry.Polygon, other: geometry.Polygon, spacing: float) -> bool:
+    """Whether two outlines hold some of the same, looked for at the middles of cells of a quarter of the spacing or of
+    a hundredth of what they have in common."""
+    low = np.maximum(one.min(axis=0), other.min(axis=0))
+    high = np.minimum(one.max(axis=0), other.max(axis=0))
+    if (high - low <= 1e-9 * max(1.0, float(np.abs(one).max()))).any():
+        return False
+    counts = np.clip(np.ceil((high - low) / (0.25 * spacing)), 1, 100).astype(int)
+    x, y = (low[i] + (np.arange(counts[i]) + 0.5) / counts[i] * (high[i] - low[i]) for i in (0, 1))
+    middles = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return bool((geometry.contains(one, middles) & geometry.contains(other, middles)).any())
+
+
+def _misplaced_inflow(scenario: Scenario) -> list[str]:
+    """An inflow that has no room, or comes too late."""
+    flow, domain, inflow = scenario.flow, scenario.domain, scenario.flow.inflow
+    if inflow is None:
+        return []
+    problems, section = [], f"flow.inflow.x_m = {inflow.x_m:g}"
+    if scenario.ground is not None and inflow.base_m < 0.0:
+        problems.append(f"flow.inflow.base_m = {inflow.base_m:g} lies below the ground; it must be at least 0")
+    reach = -_travel_upstream(scenario) if scenario.barrier is not None else np.inf
+    if inflow.x_m >= reach:
+        way = f", which is driven to x = {reach:g}" if reach < 0.0 else " at x = 0"
+        problems.append(f"{section} does not lie upstream of the barrier{way}; it must be less")
+    bodies = [("flow.shape", flow.shape.polygon)] if flow.shape is not None else []
+    bodies += [(f"flow.deposits[{place}]", deposit.shape.polygon) for place, deposit in enumerate(flow.deposits)]
+    for name, outline in bodies:
+        first = float(outline[:, 0].min())
+        if first < inflow.x_m - 1e-9 * max(1.0, abs(first)):
+            problems.append(f"{section} lies inside {name}, which begins at x = {first:g}; it must be at most that")
+    approach = APPROACH * scenario.numerics.spacing_m
+    if domain.left_m is not None and inflow.x_m >= domain.left_m > inflow.x_m - approach * (1.0 - 1e-9):
+        problems.append(
+            f"{section} has no room upstream: domain.left_m = {domain.left_m:g} must be at most "
+            f"{inflow.x_m - approach:g}, {APPROACH} cells before it"
+        )
+    if domain.right_m is not None and domain.right_m == inflow.x_m:
+        problems.append(f"{section} lies beyond domain.right_m = {domain.right_m:g}; it must be less")
+    if inflow.times[0] >= scenario.output.end_time_s and flow.shape is None:
+        problems.append(
+            f"flow.inflow.times_s begins at {inflow.times[0]:g}, when the run has ended (output.end_time_s = "
+            f"{scenario.output.end_time_s:g}); it must begin earlier"
+        )
+    return problems
+
+
+def _travel_upstream(scenario: Scenario) -> float:
+    """How far a driven barrier comes upstream until the end [m]."""
+    motion = scenario.barrier.motion if scenario.barrier is not None else None
+    if not isinstance(motion, Prescribed):
+        return 0.0
+    times = np.linspace(0.0, scenario.output.end_time_s, 1001)
+    velocity = np.interp(times, motion.times_s, motion.velocities_m_per_s)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(times))])
+    return max(0.0, -float(way.min()))
+
+
 def _extent(scenario: Scenario) -> tuple[float, float, float, float]:
     """Smallest and greatest x, smallest and greatest y [m] of flow and barrier."""
-    outline = scenario.flow.polygon
+    outline = np.concatenate(scenario.flow.outlines)
     x_low, y_low = outline.min(axis=0)
     x_high, y_high = outline.max(axis=0)
     if scenario.barrier is not None:
@@ -119,7 +206,8 @@ def _impossible_domain(scenario: Scenario) -> list[str]:
 
 def _excessive_size(scenario: Scenario) -> list[str]:
     problems = []
-    points = scenario.flow.volume / scenario.numerics.spacing_m**2 * scenario.numerics.points_per_cell
+    volume = scenario.flow.volume + scenario.flow.deposited_volume
+    points = volume / scenario.numerics.spacing_m**2 * scenario.numerics.points_per_cell
     if points > LARGEST_SCENE:
         problems.append(
             f"numerics.spacing_m = {scenario.numerics.spacing_m:g} asks for {points:.3g} material points "

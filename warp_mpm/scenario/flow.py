@@ -13,8 +13,9 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
+from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import AsWhole, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.schema import AsWhole, Coordinate, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
@@ -73,6 +74,42 @@ class FlowPolygon(Model):
     def polygon(self) -> geometry.Polygon:
         """Vertices [V, 2] in metres."""
         return np.array(self.vertices_m)
+
+
+class Block(Model):
+    """An upright rectangle on the ground."""
+
+    kind: Literal["block"]
+    left_m: Coordinate
+    """x of its upstream side."""
+    right_m: Coordinate
+    """x of its downstream side."""
+    height_m: Annotated[float, Field(ge=NARROWEST, le=1e6)]
+    """Its height."""
+
+    @model_validator(mode="after")
+    def _wide(self) -> Self:
+        if not self.right_m - self.left_m >= NARROWEST:
+            raise ValueError(
+                f"right_m = {self.right_m:g} must lie downstream of left_m = {self.left_m:g}, by at least "
+                f"{NARROWEST:g} m"
+            )
+        return self
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Vertices [4, 2] in metres."""
+        left, right, top = self.left_m, self.right_m, self.height_m
+        return np.array([[left, 0.0], [right, 0.0], [right, top], [left, top]])
+
+
+class Deposit(Model):
+    """What lies there at the start, of the flow's material: the deposit of an earlier surge."""
+
+    shape: Annotated[Block | FlowPolygon, Field(discriminator="kind")]
+    """Its outline."""
+    lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow."""
 
 
 class Skeleton(Model):
@@ -196,10 +233,14 @@ class TwoPhaseMaterial(UndrainedMaterial):
 
 
 class _FlowBase(Model):
-    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")]
-    """Outline at t = 0."""
-    velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)]
-    """Uniform velocity [x, y] at t = 0, of both phases."""
+    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")] | None = None
+    """Outline at t = 0; null of a flow that only arrives (`inflow`)."""
+    velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)] = (0.0, 0.0)
+    """Uniform velocity [x, y] at t = 0, of both phases; it must be given with a shape."""
+    inflow: Inflow | None = None
+    """What arrives at a section during the run; null: nothing does."""
+    deposits: Annotated[tuple[Deposit, ...], Field(strict=False, max_length=100)] = ()
+    """What lies there at the start and does not move, of the same material."""
     initial_stress: Literal["geostatic", "zero"] = "geostatic"
     """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
@@ -218,10 +259,39 @@ class _FlowBase(Model):
             return data | {"material": {"law": DEFAULT} | data["material"]}
         return data
 
+    @model_validator(mode="after")
+    def _something_flows(self) -> Self:
+        if self.shape is None and self.inflow is None:
+            raise ValueError("shape is missing; it must be given, unless there is an inflow")
+        if self.shape is not None and "velocity_m_per_s" not in self.model_fields_set:
+            raise ValueError("velocity_m_per_s is missing; it must be given with a shape, as a list of 2 numbers")
+        if self.shape is None and self.velocity_m_per_s != (0.0, 0.0):
+            raise ValueError(
+                f"velocity_m_per_s = {list(self.velocity_m_per_s)} is that of a shape, which is not given; the "
+                "velocities of what arrives stand in inflow"
+            )
+        return self
+
     @property
     def polygon(self) -> geometry.Polygon:
-        """Outline at t = 0, vertices [V, 2] in metres."""
-        return self.shape.polygon
+        """Outline at t = 0, vertices [V, 2] in metres; of a flow that only arrives the box of its volume and depth that
+        ends at the section."""
+        if self.shape is not None:
+            return self.shape.polygon
+        assert self.inflow is not None
+        right, low, depth = self.inflow.x_m, self.inflow.base_m, self.inflow.greatest_depth
+        left = right - self.inflow.volume / depth
+        return np.array([[left, low], [right, low], [right, low + depth], [left, low + depth]])
+
+    @property
+    def outlines(self) -> list[geometry.Polygon]:
+        """All that is there at t = 0, vertices [V, 2] each [m], and of what arrives the section [2, 2]."""
+        found = [self.shape.polygon] if self.shape is not None else []
+        found += [deposit.shape.polygon for deposit in self.deposits]
+        if self.inflow is not None:
+            x, low = self.inflow.x_m, self.inflow.base_m
+            found.append(np.array([[x, low], [x, low + self.inflow.greatest_depth]]))
+        return found
 
     @property
     def lateral_stress_ratio(self) -> float:
@@ -232,13 +302,23 @@ class _FlowBase(Model):
 
     @property
     def volume(self) -> float:
-        """Volume V_1 [m³/m]."""
-        return geometry.area(self.polygon)
+        """Volume V_1 [m³/m] of all that flows, what arrives during the run included."""
+        there = geometry.area(self.shape.polygon) if self.shape is not None else 0.0
+        return there + self.inflow.volume if self.inflow is not None else there
+
+    @property
+    def deposited_volume(self) -> float:
+        """Volume of the deposits [m³/m]."""
+        return sum(geometry.area(deposit.shape.polygon) for deposit in self.deposits)
 
     @property
     def depth(self) -> float:
-        """Flow depth h [m]: the greatest vertical thickness of the outline."""
-        return self.shape.depth_m if isinstance(self.shape, FrontAndTail) else geometry.maximum_depth(self.polygon)
+        """Flow depth h [m]: the greatest vertical thickness of the outline and of what arrives."""
+        if isinstance(self.shape, FrontAndTail):
+            there = self.shape.depth_m
+        else:
+            there = geometry.maximum_depth(self.shape.polygon) if self.shape is not None else 0.0
+        return max(there, self.inflow.greatest_depth) if self.inflow is not None else there
 
     @property
     def equivalent_length(self) -> float:
@@ -247,8 +327,9 @@ class _FlowBase(Model):
 
     @property
     def speed(self) -> float:
-        """Magnitude of the initial velocity [m/s]."""
-        return math.hypot(*self.velocity_m_per_s)
+        """Magnitude of the initial velocity [m/s], or of the greatest that arrives."""
+        speed = math.hypot(*self.velocity_m_per_s)
+        return max(speed, self.inflow.greatest_speed) if self.inflow is not None else speed
 
 
 class TwoPhaseFlow(_FlowBase):

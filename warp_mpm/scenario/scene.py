@@ -49,7 +49,7 @@ class Scenario(Model):
         Raises:
             ScenarioError: the file cannot be read, is no JSON, or says something impossible; one sentence per problem.
         """
-        return cls.model_validate(read_json(Path(path)), source_name=str(path))
+        return cls.model_validate(_beside(read_json(Path(path)), Path(path).parent), source_name=str(path))
 
     @model_validator(mode="before")
     @classmethod
@@ -84,6 +84,16 @@ class Scenario(Model):
         if found:
             raise ValueError("\n".join(found))
         return self
+
+
+def _beside(data: Any, folder: Path) -> Any:
+    """The content of a scenario file, with the files that it names looked for beside it."""
+    flow = data.get("flow") if isinstance(data, dict) else None
+    inflow = flow.get("inflow") if isinstance(flow, dict) else None
+    if not isinstance(inflow, dict) or not isinstance(inflow.get("hydrograph_csv"), str):
+        return data
+    found = inflow | {"hydrograph_csv": str(folder / inflow["hydrograph_csv"])}
+    return data | {"flow": flow | {"inflow": found}}
 
 
 def offer_anew() -> None:

@@ -24,7 +24,7 @@ def _entries(prefix: str) -> dict[str, int]:
     return {name.removeprefix(prefix).lower(): place for name, place in vars(at).items() if name.startswith(prefix)}
 
 
-_LEDGER, _LEFT = _entries("LEDGER_"), _entries("LEFT_")
+_LEDGER, _LEFT, _INFLOW = _entries("LEDGER_"), _entries("LEFT_"), _entries("INFLOW_")
 _BALANCE = {name.lower(): place for name, place in vars(at).items() if name.startswith(("GRAVITY_", "SEEPAGE_"))}
 
 
@@ -128,6 +128,7 @@ class Now:
     sums: Sequence[float]
     departed: Sequence[float]
     balanced: Sequence[float]
+    arrived: Sequence[float] = (0.0,) * at.INFLOW_SIZE
 
     def ledger(self, entry: str) -> float:
         """Sum over the material points: `LEDGER_...` of `kernels/layout.py`, in small letters."""
@@ -140,6 +141,10 @@ class Now:
     def balance(self, entry: str) -> float:
         """What gravity gave to the flow: `GRAVITY_...`, `SEEPAGE_...`."""
         return self.balanced[_BALANCE[entry]]
+
+    def inflow(self, entry: str) -> float:
+        """What an inflow has brought: `INFLOW_...`."""
+        return self.arrived[_INFLOW[entry]]
 
     @property
     def base_normal_force(self) -> float:
