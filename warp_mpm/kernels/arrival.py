@@ -11,6 +11,8 @@ from .layout import (
     CONVEYED_INTERVAL,
     CONVEYED_SPEED,
     CONVEYED_SPEED_BEFORE,
+    CONVEYED_STRETCH,
+    CONVEYED_STRETCH_BEFORE,
     CONVEYED_WAY,
     HELD,
     INFLOW_ENERGY,
@@ -61,6 +63,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             k += 1
         way = wp.float64(0.0)
         speed = wp.float64(0.0)
+        stretch = wp.float64(0.0)
         if time >= arrival.times[last]:
             way = arrival.ways[last]
         elif time > arrival.times[0]:
@@ -69,8 +72,12 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             gain = (arrival.velocities[k + 1] - first) / (arrival.times[k + 1] - arrival.times[k])
             way = arrival.ways[k] + (first + wp.float64(0.5) * gain * passed) * passed
             speed = first + gain * passed
+            share = passed / (arrival.times[k + 1] - arrival.times[k])
+            stretch = arrival.stretches[k] + share * (arrival.stretches[k + 1] - arrival.stretches[k])
         arrival.conveyed[wp.static(CONVEYED_BEFORE)] = arrival.conveyed[wp.static(CONVEYED_WAY)]
         arrival.conveyed[wp.static(CONVEYED_SPEED_BEFORE)] = arrival.conveyed[wp.static(CONVEYED_SPEED)]
+        arrival.conveyed[wp.static(CONVEYED_STRETCH_BEFORE)] = arrival.conveyed[wp.static(CONVEYED_STRETCH)]
+        arrival.conveyed[wp.static(CONVEYED_STRETCH)] = stretch
         arrival.conveyed[wp.static(CONVEYED_WAY)] = way
         arrival.conveyed[wp.static(CONVEYED_SPEED)] = speed
         arrival.conveyed[wp.static(CONVEYED_INTERVAL)] = wp.float64(k)
@@ -79,33 +86,37 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             book.clock[wp.static(SPEED_MAX)] = wp.max(book.clock[wp.static(SPEED_MAX)], fastest)
 
     @wp.func
+    def prescribed(x: wp.float64, y: wp.float64, speed: wp.float64, stretch: wp.float64, arrival: Arrival) -> V2:
+        """Velocity at a place of the approach: what differs along x leaves upward, or is fed from above."""
+        return V2(F(speed + stretch * (x - arrival.section)), F(-stretch * (y - arrival.base)))
+
+    @wp.func
     def push(
-        points: Points, p: wp.int32, pace: wp.float64, parameters: Parameters, arrival: Arrival, dt: wp.float64
+        points: Points, p: wp.int32, x: V2, pace: wp.float64, parameters: Parameters, arrival: Arrival, dt: wp.float64
     ):
         """Give to the flow what the nodes gave to a point that is held, but for gravity's share: action and reaction."""
         half = wp.float64(0.5)
-        gx = dt * wp.float64(parameters.gravity[0])
-        gy = dt * wp.float64(parameters.gravity[1])
-        held = wp.float64(F(pace * arrival.conveyed[wp.static(CONVEYED_SPEED_BEFORE)]))
+        g = dt * wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
+        speed = pace * arrival.conveyed[wp.static(CONVEYED_SPEED_BEFORE)]
+        stretch = arrival.conveyed[wp.static(CONVEYED_STRETCH_BEFORE)]
+        before = prescribed(wp.float64(x[0]), wp.float64(x[1]), speed, stretch, arrival)
+        held = wp.vec2d(wp.float64(before[0]), wp.float64(before[1]))
         v = read(points.velocity, p)
+        given = wp.vec2d(wp.float64(v[0]), wp.float64(v[1]))
         reference = wp.float64(read(points.reference_volume, p))
-        mass = reference * wp.float64(parameters.solid_density)
-        along = mass * (wp.float64(v[0]) - held - gx)
-        across = mass * (wp.float64(v[1]) - gy)
-        work = half * (along * (wp.float64(v[0]) + held) + across * wp.float64(v[1]))
+        impulse = reference * wp.float64(parameters.solid_density) * (given - held - g)
+        work = half * wp.dot(impulse, given + held)
         if TWO_PHASE:
-            liquid = reference * wp.float64(parameters.liquid_density)
-            liquid_along = liquid * (wp.float64(v[2]) - held - gx)
-            liquid_across = liquid * (wp.float64(v[3]) - gy)
-            along += liquid_along
-            across += liquid_across
-            work += half * (liquid_along * (wp.float64(v[2]) + held) + liquid_across * wp.float64(v[3]))
-        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_X), -along)
-        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_Y), -across)
+            given = wp.vec2d(wp.float64(v[2]), wp.float64(v[3]))
+            of_liquid = reference * wp.float64(parameters.liquid_density) * (given - held - g)
+            work += half * wp.dot(of_liquid, given + held)
+            impulse += of_liquid
+        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_X), -impulse[0])
+        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_Y), -impulse[1])
         wp.atomic_add(arrival.inflow, wp.static(INFLOW_ENERGY), -work)
 
     @wp.func
-    def let_go(points: Points, p: wp.int32, x: V2, speed: F, parameters: Parameters, arrival: Arrival, book: Book):
+    def let_go(points: Points, p: wp.int32, x: V2, v: V2, parameters: Parameters, arrival: Arrival, book: Book):
         """Hand a point over to the flow, and keep account of what it brings."""
         points.inside[p] = wp.static(INSIDE)
         reference = read(points.reference_volume, p)
@@ -118,9 +129,9 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             wp.atomic_add(arrival.inflow, wp.static(INFLOW_LIQUID_MASS), liquid)
         wp.atomic_add(book.balance, wp.static(INITIAL_MASS_SOLID), solid)
         wp.atomic_add(arrival.inflow, wp.static(INFLOW_SOLID_MASS), solid)
-        v = wp.float64(speed)
-        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_X), total * v)
-        energy = wp.float64(0.5) * v * v - wp.float64(wp.dot(parameters.gravity, x))
+        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_X), total * wp.float64(v[0]))
+        wp.atomic_add(arrival.inflow, wp.static(INFLOW_MOMENTUM_Y), total * wp.float64(v[1]))
+        energy = wp.float64(F(0.5) * wp.dot(v, v) - wp.dot(parameters.gravity, x))
         wp.atomic_add(arrival.inflow, wp.static(INFLOW_ENERGY), total * energy)
 
     @wp.kernel(module=module)
@@ -136,7 +147,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         at = wp.float64(x[0]) + pace * way
         if state == wp.static(HELD):
             at -= pace * arrival.conveyed[wp.static(CONVEYED_BEFORE)]
-            push(points, p, pace, parameters, arrival, book.clock[wp.static(TIME_STEP)])
+            push(points, p, x, pace, parameters, arrival, book.clock[wp.static(TIME_STEP)])
         elif at < arrival.entry:
             return
         place = V2(F(at), x[1])
@@ -151,12 +162,14 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             points.inside[p] = wp.static(WAITING)
             rest(points, p)
             return
-        speed = F(pace * arrival.conveyed[wp.static(CONVEYED_SPEED)])
+        speed = pace * arrival.conveyed[wp.static(CONVEYED_SPEED)]
+        stretch = arrival.conveyed[wp.static(CONVEYED_STRETCH)]
+        v = prescribed(wp.float64(place[0]), wp.float64(place[1]), speed, stretch, arrival)
         velocity = V()
         if TWO_PHASE:
-            velocity = V(speed, F(0.0), speed, F(0.0))
+            velocity = V(v[0], v[1], v[0], v[1])
         else:
-            velocity = V(speed, F(0.0))
+            velocity = V(v[0], v[1])
         write(points.velocity, p, velocity)
         write(points.position, p, place)
         rest(points, p)
@@ -168,6 +181,6 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         halt(points, p)
         points.inside[p] = wp.static(HELD)
         if at >= arrival.section:
-            let_go(points, p, place, speed, parameters, arrival, book)
+            let_go(points, p, place, v, parameters, arrival, book)
 
     return SimpleNamespace(convey=convey, hold=hold)

@@ -127,7 +127,10 @@ CONVEYED_SPEED = 2
 CONVEYED_SPEED_BEFORE = 3
 CONVEYED_INTERVAL = 4
 """Of the table, in which the time lies."""
-CONVEYED_SIZE = 5
+CONVEYED_STRETCH = 5
+"""Change of the velocity along x at the section, at the end of the step [1/s]."""
+CONVEYED_STRETCH_BEFORE = 6
+CONVEYED_SIZE = 7
 
 # Entries of a slot of the barrier (`simulator.bodies.loads`): impulses since t = 0 [N s/m].
 SLOT_NORMAL = 0
@@ -289,9 +292,11 @@ def layout(effects: Effects) -> SimpleNamespace:
             "times": array(dtype=wp.float64),
             "velocities": array(dtype=wp.float64),
             "ways": array(dtype=wp.float64),
+            "stretches": array(dtype=wp.float64),
             "conveyed": array(dtype=wp.float64),
             "inflow": array(dtype=wp.float64),
             "section": wp.float64,  # x [m]
+            "base": wp.float64,  # y of the underside [m]
             "entry": wp.float64,  # x of the upstream end of the approach [m]
             "fastest": wp.float64,  # greatest velocity of the table, at any height [m/s]
         }

@@ -141,6 +141,15 @@ class Inflow(Model):
         steps = 0.5 * (self.velocities[1:] + self.velocities[:-1]) * np.diff(self.times)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
+    @property
+    def stretches(self) -> Array:
+        """Change of the velocity along x at the section at the times [K] [1/s], of a flow of which each part keeps its
+        own velocity: -(du/dt) / u. Bounded, so that the surface falls or rises at a quarter of √(g h) at most."""
+        u, h = self.velocities, self.depths
+        gain = np.gradient(u, self.times)
+        bound = 0.25 * np.sqrt(9.81 / np.maximum(h, 1e-9))
+        return np.clip(-np.divide(gain, u, out=np.zeros(len(u)), where=u > 0.0), -bound, bound)
+
     def way(self, time: float) -> float:
         """That way until a time [s]."""
         times, velocities = self.times, self.velocities

@@ -82,7 +82,9 @@ def arrival_arrays(scenario: Scenario, types: SimpleNamespace, *, device: Any) -
         "times": inflow.times,
         "velocities": inflow.velocities,
         "ways": inflow.ways,
+        "stretches": inflow.stretches,
         "section": inflow.x_m,
+        "base": inflow.base_m,
         "entry": inflow.x_m - APPROACH * scenario.numerics.spacing_m,
         "fastest": inflow.greatest_speed,
     }
