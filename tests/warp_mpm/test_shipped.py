@@ -23,6 +23,7 @@ from warp_mpm.scenario_errors import ScenarioError
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted(path.relative_to(ROOT / "scenarios").as_posix() for path in (ROOT / "scenarios").rglob("*.json"))
+TABLES = sorted(path.relative_to(ROOT / "scenarios").as_posix() for path in (ROOT / "scenarios").rglob("*.csv"))
 
 
 def scenarios(*arguments):
@@ -41,12 +42,13 @@ def test_every_scene_is_listed_with_its_title():
 def test_scenes_are_copied_where_the_examples_look_for_them(tmp_path):
     answer = scenarios("--out", tmp_path / "scenarios")
     assert answer.exit_code == 0
-    assert answer.stderr == f"Copied into {tmp_path / 'scenarios'}: {len(FILES)} files.\n"
-    for name in FILES:
+    assert answer.stderr == f"Copied into {tmp_path / 'scenarios'}: {len(FILES) + len(TABLES)} files.\n"
+    assert "site_two_surges.csv" in TABLES
+    for name in FILES + TABLES:
         assert (tmp_path / "scenarios" / name).read_bytes() == (ROOT / "scenarios" / name).read_bytes()
     again = scenarios("--out", tmp_path / "scenarios")
     assert again.exit_code == 0
-    assert f"0 files; {len(FILES)} were there already." in again.stderr
+    assert f"0 files; {len(FILES) + len(TABLES)} were there already." in again.stderr
 
 
 def test_a_name_may_be_written_as_the_file_is(tmp_path):

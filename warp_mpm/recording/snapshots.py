@@ -134,7 +134,7 @@ class SnapshotRecorder:
         points = dict(simulation.points())
         position = np.asarray(points.pop("position"))
         if self._count == 0:
-            most = max(len(position), simulation.material_points)  # more may arrive
+            most = max(len(position), getattr(simulation, "material_points", 0))  # more may arrive
             self._lay_out(most, {name: np.asarray(values) for name, values in points.items()})
         assert self._file is not None
         filled = self._filled
