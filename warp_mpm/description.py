@@ -10,7 +10,8 @@ from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
 
 
 def described(scenario: Scenario) -> list[str]:
-    """A scene in two lines: flow and ground; barrier and run."""
+    """A scene in two lines: flow and ground; barrier and run. Between them, where there is such, one on what arrives
+    and what lies there."""
     flow, numerics, ground, tilt = scenario.flow, scenario.numerics, scenario.ground, scenario.gravity.tilt_deg
     speed = f"v = {flow.speed:.4g} m/s"
     if scenario.gravity.acceleration_m_per_s2 > 0.0:

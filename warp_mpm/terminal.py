@@ -80,8 +80,8 @@ class RunDisplay:
 
     def __enter__(self) -> Self:
         self._console.print(self._scenario.title, style="bold")
-        flow, rest = described(self._scenario)
-        self._console.print(f"{flow}\n{rest}; {self._device}", soft_wrap=True)
+        lines = "\n".join(described(self._scenario))
+        self._console.print(f"{lines}; {self._device}", soft_wrap=True)
         for sentence in scene_caveats(self._scenario):
             self._console.print(f"Note: {sentence}", soft_wrap=True)
         if self._console.is_terminal and not self._console.quiet:
