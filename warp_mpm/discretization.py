@@ -119,12 +119,31 @@ def _join_slivers(
                 break
 
 
+def _along_slopes(scenario: Scenario, position: Array, stress: Array) -> tuple[Array, Array]:
+    """cos² alpha [N] of the slope that the flow's surface and the ground share at each point, and the stress [N, 4] of
+    a level layer, as that of one along the slope."""
+    assert scenario.ground is not None
+    surface = geometry.surface_slope(scenario.flow.polygon, position)
+    ground = scenario.ground.slope(position[:, 0])
+    shared = np.where(surface * ground > 0.0, np.sign(ground) * np.minimum(np.abs(surface), np.abs(ground)), 0.0)
+    square = 1.0 / (1.0 + shared**2)
+    lateral, vertical = square * stress[:, 0], square * stress[:, 1]
+    xx = square * (lateral + shared**2 * vertical)
+    yy = square * (vertical + shared**2 * lateral)
+    xy = square * shared * (lateral - vertical)
+    return square, np.stack([xx, yy, square * stress[:, 2], xy], axis=1)
+
+
 def material_points(scenario: Scenario) -> MaterialPoints:
     """The scenario's flow as material points, with masses and initial stress.
 
     Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
     share of the weight; the vertical effective stress carries the rest, and the horizontal ones are K0 times it.
     Gravity's component along the ground is left out of the initial stress.
+
+    Over a profile the stress is that of a long slope of the angle alpha that surface and ground share, the lesser of
+    the two where both fall to one side: normal to the slope, cos² alpha of what lies above, and K0 along it. Under a
+    level surface it is the whole, whatever the ground: a pond is at rest.
     """
     flow, numerics = scenario.flow, scenario.numerics
     material = flow.material
@@ -142,6 +161,9 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         vertical = -(material.density - borne) * downward * depth
         lateral = flow.lateral_stress_ratio * vertical
         effective_stress[:, 0], effective_stress[:, 1], effective_stress[:, 2] = lateral, vertical, lateral
+        if scenario.ground is not None and not scenario.ground.level:
+            square, rotated = _along_slopes(scenario, position, effective_stress)
+            pore_pressure, effective_stress = square * pore_pressure, rotated
     return MaterialPoints(
         position=position,
         volume=volume,

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.barrier_figures import barrier_figures
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
@@ -127,6 +128,7 @@ def run_in_memory(
     }
     columns = series.series()
     summary = summarize(scenario, columns, snapshots.snapshots, _of_the_run(record))
+    summary |= barrier_figures(scenario, columns, snapshots.snapshots)
     summary["notes"] = [*scene_caveats(scenario), *run_caveats(record, summary)]
     return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary)
 
@@ -353,6 +355,7 @@ def evaluate(path: str | Path) -> dict[str, Any]:
     record = results.record
     with results.snapshots as snapshots:
         summary = summarize(results.scenario, results.time_series, snapshots, _of_the_run(record))
+        summary |= barrier_figures(results.scenario, results.time_series, snapshots)
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
@@ -370,11 +373,11 @@ def _draw(results: Results, path: Path) -> None:
 
 
 def _write_surfaces(results: Results, path: Path) -> None:
-    """Barrier and ground beside the snapshots, as far as the material reaches."""
+    """Barriers and ground beside the snapshots, as far as the material reaches."""
     snapshots = results.snapshots
     displacements, edges = [], []
     for snapshot in snapshots:
-        displacements.append(snapshot.barrier_displacement)
+        displacements.append(results.barrier_displacements(snapshot))
         x, y = snapshot.position.T if len(snapshot.position) else np.zeros((2, 1))
         edges.append((x.min(), x.max(), y.max()))
     if edges:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 _PACKAGE = Path(__file__).parent
 _PACKED = _PACKAGE / "scenarios"
@@ -15,6 +17,22 @@ def scenario_files() -> dict[str, Path]:
     """The files by their names, as commands are given them under `scenarios/`: `case_1`, `hard/speed_50`, ..."""
     files = [*sorted(SCENARIOS.glob("*.json")), *sorted(SCENARIOS.glob("*/*.json"))]
     return {file.relative_to(SCENARIOS).with_suffix("").as_posix(): file for file in files}
+
+
+def named_beside(scenario: Path) -> list[Path]:
+    """Tables that a scenario file names in fields that end in `_csv`, which lie beside it."""
+    found: list[Path] = []
+
+    def look(content: Any) -> None:
+        for key, value in content.items() if isinstance(content, dict) else ():
+            if key.endswith("_csv") and isinstance(value, str):
+                found.append(scenario.parent / value)
+            look(value)
+        for value in content if isinstance(content, list) else ():
+            look(value)
+
+    look(json.loads(scenario.read_text(encoding="utf-8")))
+    return found
 
 
 def where_to_get(missing: Path) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from warp_mpm import geometry
-from warp_mpm.scenario.barrier import Sliding, Trapezoid, Wall
+from warp_mpm.scenario.barrier import Sliding, Trapezoid
+from warp_mpm.scenario.site import all_standing, lowest_ground, site_problems
 
 if TYPE_CHECKING:
     from warp_mpm.scenario.scene import Scenario
@@ -33,14 +31,15 @@ BYTES_PER_POINT = 500
 
 def problems(scenario: Scenario) -> list[str]:
     """All that makes the scene impossible; empty where nothing does."""
-    found = [*_misplaced_flow(scenario), *_impossible_domain(scenario), *_excessive_size(scenario)]
+    found = [*site_problems(scenario), *_impossible_domain(scenario), *_excessive_size(scenario)]
     barrier = scenario.barrier
     if scenario.ground is None and barrier is not None and isinstance(barrier.motion, Sliding):
         found.append("ground = null is not allowed with a sliding barrier, which needs a base to slide on")
     elif scenario.ground is None and barrier is not None and isinstance(barrier.shape, Trapezoid):
         found.append(
-            'ground = null is not allowed with barrier.shape of the kind "trapezoid", which has no underside and would '
-            'lift what flows beneath it; give a ground, or the kind "wall", which has no end below either'
+            f'ground = null is not allowed with barrier.shape of the kind "{barrier.shape.kind}", which has no '
+            'underside and would lift what flows beneath it; give a ground, or the kind "wall", which has no end below '
+            "either"
         )
     inertial = getattr(scenario.flow.material, "inertial_drag_coefficient", 0.0)
     if scenario.numerics.drag == "explicit" and inertial > 0.0:
@@ -62,40 +61,16 @@ def problems(scenario: Scenario) -> list[str]:
     return found
 
 
-def _misplaced_flow(scenario: Scenario) -> list[str]:
-    outline = scenario.flow.polygon
-    problems = []
-    lowest = float(outline[:, 1].min())
-    # A hair below is rounding of the user's own arithmetic.
-    hair = 1e-9 * max(1.0, float(np.abs(outline).max()))
-    if scenario.ground is not None and lowest < -hair:
-        problems.append(f"flow.shape reaches y = {lowest:g} m; it must stay on or above the ground, y >= 0")
-    if scenario.barrier is not None:
-        if isinstance(scenario.barrier.shape, Wall):
-            inside = geometry.clip_half_plane(outline, (-1.0, 0.0), 0.0)
-        else:
-            inside = geometry.clip_convex(outline, scenario.barrier.shape.polygon)
-        overlap = geometry.area(inside) if len(inside) else 0.0
-        if overlap > hair * scenario.flow.depth:
-            problems.append(
-                f"flow.shape lies inside the barrier by {overlap:.3g} m³/m; it must lie outside "
-                "(the barrier's toe is at x = 0 and its body at x >= 0)"
-            )
-    return problems
-
-
 def _extent(scenario: Scenario) -> tuple[float, float, float, float]:
-    """Smallest and greatest x, smallest and greatest y [m] of flow and barrier."""
+    """Smallest and greatest x, smallest and greatest y [m] of flow and barriers."""
     outline = scenario.flow.polygon
     x_low, y_low = outline.min(axis=0)
     x_high, y_high = outline.max(axis=0)
-    if scenario.barrier is not None:
-        x_low = min(x_low, 0.0)
-        if isinstance(scenario.barrier.shape, Trapezoid):
-            base, _, height = scenario.barrier.shape.base_crest_height
-            x_high, y_high = max(x_high, base), max(y_high, height)
-        else:
-            x_high = max(x_high, 0.0)
+    for _, x, _, standing in all_standing(scenario):
+        x_low, x_high = min(x_low, x), max(x_high, x)
+        if standing is not None:
+            x_low, x_high = min(x_low, standing[:, 0].min()), max(x_high, standing[:, 0].max())
+            y_high = max(y_high, standing[:, 1].max())
     return float(x_low), float(x_high), float(y_low), float(y_high)
 
 
@@ -111,7 +86,8 @@ def _impossible_domain(scenario: Scenario) -> list[str]:
         problems.append(f"domain.top_m = {domain.top_m:g} cuts the scene; it must be at least {y_high:g}")
     if domain.bottom_m is not None:
         if scenario.ground is not None:
-            problems.append("domain.bottom_m is not allowed with a ground, which is the lower edge at y = 0")
+            where = " at y = 0" if scenario.ground.level else ""
+            problems.append(f"domain.bottom_m is not allowed with a ground, which is the lower edge{where}")
         elif domain.bottom_m > y_low:
             problems.append(f"domain.bottom_m = {domain.bottom_m:g} cuts the scene; it must be at most {y_low:g}")
     return problems
@@ -137,7 +113,7 @@ def _excessive_size(scenario: Scenario) -> list[str]:
         asked if asked is not None else fitted
         for asked, fitted in zip(given, (x_low, x_high, y_low, y_high), strict=True)
     )
-    low = 0.0 if scenario.ground is not None else low
+    low = lowest_ground(scenario, left, right) if scenario.ground is not None else low
     nodes = (right - left) * (high - low) / scenario.numerics.spacing_m**2
     if nodes > LARGEST_GRID:
         problems.append(

@@ -13,8 +13,20 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
+from warp_mpm.scenario.ground import Ground
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import AsWhole, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.schema import (
+    AsWhole,
+    Coordinate,
+    Density,
+    Length,
+    Model,
+    NonNegative,
+    Point,
+    Positive,
+    Velocity,
+    set_fields,
+)
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
@@ -73,6 +85,49 @@ class FlowPolygon(Model):
     def polygon(self) -> geometry.Polygon:
         """Vertices [V, 2] in metres."""
         return np.array(self.vertices_m)
+
+
+class FlowOnGround(Model):
+    """A flow that lies on the ground, whatever its profile: made into a polygon when the scenario is read."""
+
+    kind: Literal["on_ground"]
+    from_m: Coordinate
+    """x of its tail."""
+    to_m: Coordinate
+    """x of its front."""
+    depth_m: Length
+    """Upright depth between tail and front."""
+    tail_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth grows from nothing at the tail; 0: an upright end."""
+    front_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth goes down to nothing at the front."""
+
+    @model_validator(mode="after")
+    def _long_enough(self) -> Self:
+        if not self.to_m - self.from_m >= max(self.tail_m + self.front_m, NARROWEST):
+            raise ValueError(
+                f"to_m = {self.to_m:g} must be at least {max(self.tail_m + self.front_m, NARROWEST):g} m, tail_m and "
+                f"front_m, beyond from_m = {self.from_m:g}"
+            )
+        return self
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres on level ground."""
+        return self.over(Ground())
+
+    def over(self, ground: Ground) -> geometry.Polygon:
+        """Vertices [V, 2] in metres over `ground`, anticlockwise from the tail."""
+        x = ground.profile[:, 0]
+        ends = [[place, float(ground.height(place))] for place in (self.from_m, self.to_m)]
+        lower = np.concatenate([ends[:1], ground.profile[(x > self.from_m) & (x < self.to_m)], ends[1:]])
+        top = np.unique([*lower[:, 0], self.from_m + self.tail_m, self.to_m - self.front_m])
+        depth = self.depth_m * np.minimum(
+            np.clip((top - self.from_m) / self.tail_m, 0.0, 1.0) if self.tail_m else 1.0,
+            np.clip((self.to_m - top) / self.front_m, 0.0, 1.0) if self.front_m else 1.0,
+        )
+        upper = np.stack([top, ground.height(top) + depth], axis=1)
+        return np.concatenate([lower, upper[depth > 0.0][::-1]])
 
 
 class Skeleton(Model):
@@ -196,7 +251,7 @@ class TwoPhaseMaterial(UndrainedMaterial):
 
 
 class _FlowBase(Model):
-    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")]
+    shape: Annotated[FrontAndTail | FlowPolygon | FlowOnGround, Field(discriminator="kind")]
     """Outline at t = 0."""
     velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)]
     """Uniform velocity [x, y] at t = 0, of both phases."""
