@@ -289,7 +289,7 @@ class Simulation:
     def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
         kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
-        if self._commands is not None:
+        if self._commands is not None and command is not None:  # of no threads there is none
             self._commands.append((launch.kernel, command))
         if self._on_launch is not None:
             self._on_launch(launch.kernel)

@@ -24,8 +24,9 @@ def scenarios(
 ) -> None:
     """List the scenes that come with the program, or copy them.
 
-    These are the paper's scenes, sites of several parts (site_...), in hard/ those that were chosen to break the code, and in sweeps/ examples of sweeps.
-    Copied into a folder `scenarios`, they are where the examples of the help texts and of the pages look for them.
+    These are the paper's scenes, sites (site_...), in hard/ those that were chosen to break the code, and in sweeps/
+    examples of sweeps. Copied into a folder `scenarios`, they are where the examples of the help texts and of the pages
+    look for them; a table that one of them names is copied too.
     """
     from warp_mpm.shipped import SCENARIOS, named_beside, scenario_files
 

@@ -32,7 +32,7 @@ class Stretch(Model):
     """Ground from a place on, with its own friction."""
 
     from_m: Coordinate
-    """x from which on the friction holds, up to where the next stretch begins; as in the profile."""
+    """x in the profile from which on the friction holds, up to where the next stretch begins."""
     friction: Friction
     """Friction coefficient tan φ_b between the flow's solid and the ground."""
 
@@ -48,9 +48,10 @@ class Ground(Model):
     profile_csv: Text | None = None
     """File beside the scenario with the profile's points, in place of profile_m: two columns x, y, or a GeoJSON
     LineString. Its points stand in profile_m of the scenario that a run keeps."""
-    origin_m: Coordinate = 0.0
-    """x in the profile of the point that is the scene's origin, where the barrier's toe stands: everything else in the
-    scenario is measured from there."""
+    origin_m: Coordinate | None = None
+    """x in the profile of the point of the ground that is the scene's origin, where the barrier's toe stands:
+    everything else in the scenario is measured from there. null: the profile's own origin, which lies on the ground
+    where there is a barrier."""
     stretches: Annotated[tuple[Stretch, ...], Field(strict=False, max_length=100)] = ()
     """Where the friction changes, in order of from_m; before the first one `friction` holds."""
 
@@ -67,8 +68,8 @@ class Ground(Model):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if self.profile_m is None:
-            if self.origin_m != 0.0:
-                raise ValueError(f"origin_m = {self.origin_m:g} is a place in a profile; without one it must be 0")
+            if self.origin_m is not None:
+                raise ValueError(f"origin_m = {self.origin_m:g} is a place in a profile; without one it must be null")
         else:
             self._check_profile(np.array(self.profile_m))
         places = [stretch.from_m for stretch in self.stretches]
@@ -95,6 +96,8 @@ class Ground(Model):
             raise ValueError(
                 "profile_m begins or ends with an upright step; its first and last piece must lead along x"
             )
+        if self.origin_m is None:
+            return
         if not x[0] <= self.origin_m <= x[-1]:
             raise ValueError(
                 f"origin_m = {self.origin_m:g} lies outside of the profile; it must be from {x[0]:g} to {x[-1]:g}"
@@ -112,7 +115,7 @@ class Ground(Model):
     @cached_property
     def _origin(self) -> Array:
         """[2] the scene's origin in the profile's coordinates."""
-        if self.profile_m is None:
+        if self.profile_m is None or self.origin_m is None:
             return np.zeros(2)
         x, y = np.array(self.profile_m).T
         return np.array([self.origin_m, np.interp(self.origin_m, x, y)])
@@ -135,7 +138,7 @@ class Ground(Model):
     @property
     def frictions(self) -> list[tuple[float, float]]:
         """Where each stretch begins [m], from the scene's origin, the first one at -inf, and its friction."""
-        begin = self._origin[0] if self.profile_m is not None else 0.0
+        begin = float(self._origin[0])
         return [(-math.inf, self.friction)] + [(stretch.from_m - begin, stretch.friction) for stretch in self.stretches]
 
     @property

@@ -109,6 +109,12 @@ def _misplaced(scenario: Scenario, field: str, x: float, barrier: Barrier, outli
     if not first <= x <= last:
         place = f"{field}.x_m = {x:g}" if isinstance(barrier, FurtherBarrier) else f"the toe of {field} at x = {x:g}"
         return [f"{place} lies beyond the ground's profile; it must be from {first:g} to {last:g}"]
+    at = float(ground.height(x))
+    if field == "barrier" and abs(at) > 1e-6 * max(1.0, float(np.ptp(ground.profile))):
+        return [
+            f"ground.profile_m is at y = {at:g} m at x = 0, where the barrier's toe stands; it must be at 0 there, or "
+            "ground.origin_m name the place of the toe in the profile"
+        ]
     if outline is None:
         return found
     heel, hair = outline[-1], 1e-6 * float(np.ptp(outline))
