@@ -8,6 +8,8 @@ from typing import Any
 
 from .effects import Effects
 from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .simulator.bodies.of_scene import ground_body
+from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
 from .simulator.schemes import SCHEMES
 
@@ -186,7 +188,16 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
             if past
             else "the grid rests or passes nothing",
         ),
+        Rule("profile", *_many_pieces(scenario)),
     ]
+
+
+def _many_pieces(scenario: Scenario) -> tuple[bool, str]:
+    """Whether the ground has so many pieces that points look for those about them, and why."""
+    if scenario.ground is None or scenario.ground.level:
+        return False, "the ground is level" if scenario.ground is not None else "there is no ground"
+    pieces = len(ground_body(scenario.ground).outline.segments)
+    return pieces > FEW, f"the ground has {pieces} {'piece' if pieces == 1 else 'pieces'}"
 
 
 def _switch_friction(scenario: Scenario, changes: dict[str, Any], rubs: bool) -> dict[str, Any]:

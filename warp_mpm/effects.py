@@ -55,6 +55,8 @@ class Effects:
     """Some places of contact share nodes, or act on a body that slides: their impulses are found together."""
     passing: bool = False
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
+    profile: bool = False
+    """The ground has many pieces, of which a point looks at those about its column of the grid alone."""
 
     @property
     def liquid(self) -> bool:
@@ -114,6 +116,7 @@ class Effects:
                 "driven",
                 "joined",
                 "passing",
+                "profile",
             )
             if getattr(self, name)
         ]
