@@ -67,6 +67,7 @@ SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
     **dict.fromkeys(("definitions", "mechanism_measures", "verdict"), (dict, NoneType)),
     "notes": (list,),
+    "barriers": (list, NoneType),
 }
 """The same of its summary; figures of quantities that a script records are numbers too."""
 

@@ -104,7 +104,7 @@ def of_further_barrier(name: str, what: str) -> Sampled:
 
 def further_quantities(scenario: Any) -> dict[str, Sampled]:
     """What a scene tells of its further barriers, by key: force on the whole of each, and how it moves."""
-    found = {}
+    found: dict[str, Sampled] = {}
     for one in getattr(scenario, "barriers", ()):
         rows = [force_of_surface(one.name, axis) for axis in "xy"]
         if one.motion.kind != "fixed":

@@ -122,10 +122,11 @@ class FlowOnGround(Model):
         ends = [[place, float(ground.height(place))] for place in (self.from_m, self.to_m)]
         lower = np.concatenate([ends[:1], ground.profile[(x > self.from_m) & (x < self.to_m)], ends[1:]])
         top = np.unique([*lower[:, 0], self.from_m + self.tail_m, self.to_m - self.front_m])
-        depth = self.depth_m * np.minimum(
-            np.clip((top - self.from_m) / self.tail_m, 0.0, 1.0) if self.tail_m else 1.0,
-            np.clip((self.to_m - top) / self.front_m, 0.0, 1.0) if self.front_m else 1.0,
-        )
+        depth = np.full(len(top), self.depth_m)
+        if self.tail_m:
+            depth *= np.clip((top - self.from_m) / self.tail_m, 0.0, 1.0)
+        if self.front_m:
+            depth *= np.clip((self.to_m - top) / self.front_m, 0.0, 1.0)
         upper = np.stack([top, ground.height(top) + depth], axis=1)
         return np.concatenate([lower, upper[depth > 0.0][::-1]])
 

@@ -107,6 +107,11 @@ class Ground(Model):
                 f"origin_m = {self.origin_m:g} lies on an upright step of the profile; it must lie beside it"
             )
 
+    def __eq__(self, other: object) -> bool:
+        # What is kept beside the fields, in arrays, is no part of it.
+        fields = type(self).model_fields
+        return isinstance(other, Ground) and all(getattr(self, name) == getattr(other, name) for name in fields)
+
     @property
     def level(self) -> bool:
         """Whether it is the plane y = 0 of one friction, without end."""
