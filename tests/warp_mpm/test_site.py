@@ -100,7 +100,7 @@ def test_profiles_that_are_refused(ground, message):
             {"flow": {"shape": {"kind": "polygon", "vertices_m": [[-50, 20], [-8, 20], [-8, 25]]}}},
             r"flow.shape reaches from x = -50 to -8 m; it must stay within the ground's profile, from -40 to 40",
         ),
-        ({"flow": {"shape": {"kind": "on_ground", "from_m": 1, "to_m": 1, "depth_m": 2}}}, r"to_m = 1 must be at least"),
+        ({"flow": {"shape": {"kind": "on_ground", "from_m": 1, "to_m": 1, "depth_m": 2}}}, r"to_m = 1 must be"),
         (
             {"ground": {"profile_m": [[-40, 5], [40, -5.5]]}, "barrier": DAM},
             r"ground.profile_m is at y = -0.25 m at x = 0, where the barrier's toe stands",
@@ -121,7 +121,7 @@ def test_profiles_that_are_refused(ground, message):
             {"barrier": DAM | {"shape": {"kind": "outline", "vertices_m": [[0, 0], [2, 3], [1, 3], [2, 1], [3, 0]]}}},
             r"vertices_m must not cross or touch themselves",
         ),
-        ({"barriers": [DAM | {"name": "second", "x_m": 60}]}, r"barriers\[0\].x_m = 60 lies beyond the ground's profile"),
+        ({"barriers": [DAM | {"name": "second", "x_m": 60}]}, r"barriers\[0\].x_m = 60 lies beyond the"),
         (
             {"barriers": [DAM | {"name": "one", "x_m": 2}, DAM | {"name": "two", "x_m": 4}]},
             r"barriers\[1\] overlaps barriers\[0\] by 0.5 m²; barriers may touch but not overlap",
@@ -138,7 +138,7 @@ def test_profiles_that_are_refused(ground, message):
             },
             r"barriers\[0\].motion of the kind sliding needs level ground under the barrier, from x = -3 to 0",
         ),
-        ({"ground": None, "barriers": [DAM | {"name": "one", "x_m": 2}]}, r"ground = null is not allowed with barriers"),
+        ({"ground": None, "barriers": [DAM | {"name": "one", "x_m": 2}]}, r"ground = null is not allowed"),
     ],
 )  # fmt: skip
 def test_sites_that_are_impossible(changes, message):
