@@ -188,6 +188,10 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
     if scenario.ground is not None and scenario.ground.friction != 0:
         remarks.append("The friction between flow and ground is left out.")
+    if scenario.ground is not None and scenario.ground.profile_m is not None:
+        remarks.append("The ground's profile is left out: the closed form knows one slope, gravity.tilt_deg.")
+    if scenario.barriers:
+        remarks.append("Further barriers are left out.")
     return Scene(
         title=scenario.title,
         flow_mass=flow.volume * flow.material.density,
@@ -199,8 +203,8 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         gravity=scenario.gravity.acceleration_m_per_s2,
         slope=scenario.gravity.tilt_deg,
         porosity=flow.material.porosity,
-        face_angle=shape.built_face_angle_deg if shape.kind == "trapezoid" else 90.0,
-        barrier_height=shape.base_crest_height[2] if shape.kind == "trapezoid" else math.inf,
+        face_angle=shape.built_face_angle_deg if shape.kind != "wall" else 90.0,
+        barrier_height=shape.base_crest_height[2] if shape.kind != "wall" else math.inf,
         barrier_density=barrier.density,
         distance=-float(flow.polygon[:, 0].max()),
         remarks=tuple(remarks),

@@ -43,7 +43,8 @@ def scene_caveats(scenario: Scenario) -> list[str]:
     found += slips(scenario)
     found += LAWS.named(flow.material.law).caveats(flow.material)
     found += [*_unlikely_friction(scenario), *_impossible_start(scenario)]
-    if scenario.barrier is not None and not _can_arrive(scenario):
+    uneven = scenario.ground is not None and scenario.ground.profile_m is not None
+    if scenario.barrier is not None and not uneven and not _can_arrive(scenario):
         driven = isinstance(scenario.barrier.motion, Prescribed)
         found.append(
             f"The flow does not get to the barrier by t = {scenario.output.end_time_s:g} s; look at "
@@ -57,6 +58,12 @@ def scene_caveats(scenario: Scenario) -> list[str]:
 def _unlikely_friction(scenario: Scenario) -> list[str]:
     """Surfaces that are rougher than any."""
     given: dict[str, float | None] = {"ground.friction": scenario.ground.friction if scenario.ground else None}
+    for number, stretch in enumerate(scenario.ground.stretches if scenario.ground else ()):
+        given[f"ground.stretches[{number}].friction"] = stretch.friction
+    for number, further in enumerate(scenario.barriers):
+        given |= {
+            f"barriers[{number}].friction.{name}": getattr(further.friction, name) for name in ("face", "top", "back")
+        }
     if scenario.barrier is not None:
         rubbing = scenario.barrier.friction
         given |= {f"barrier.friction.{name}": getattr(rubbing, name) for name in ("face", "top", "back")}

@@ -38,7 +38,8 @@ class MaterialPoints:
     """[N, 2] m/s, of both phases; zeros of what has yet to arrive."""
     entry: Array
     """[N] way of the inflow [m] at which a point comes into the approach, increasing; -inf of what is there at the
-    start. Until then its position is the one that it would have had at way 0, were the flow to go on upstream."""
+    start. Until then its x is the one that it would have had at way 0, were the flow to go on upstream, and its y that
+    at the section."""
     pace: Array
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
 
@@ -75,6 +76,8 @@ class _Part:
     volume: Array
     below: Array
     """[N] m below its surface."""
+    slope: Array
+    """[N] dy/dx of the long slope whose stress it has."""
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
     velocity: tuple[float, float] = (0.0, 0.0)
@@ -217,7 +220,7 @@ def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> Arr
     if inflow.pore_pressure_ratios is not None:
         given = np.interp(_time_of(inflow, ways), inflow.times, inflow.pore_pressure_ratios)
         ratio = given[order]
-    position = np.stack([start, inflow.base_m + 0.5 * (low + high)], axis=1)
+    position = np.stack([start, inflow.base + 0.5 * (low + high)], axis=1)
     below = depth - 0.5 * (low + high)
     return ArrivingPoints(position[order], volumes[order], below[order], entry[order], pace[order], ratio)
 
@@ -231,6 +234,25 @@ def _time_of(inflow: Inflow, way: Array) -> Array:
     return np.interp(way, ways[moving], times[moving])
 
 
+def _along_slope(slope: Array, stress: Array) -> tuple[Array, Array]:
+    """cos² alpha [N] of slopes dy/dx [N], and the stress [N, 4] of a level layer, as that of one along the slope."""
+    square = 1.0 / (1.0 + slope**2)
+    lateral, vertical = square * stress[:, 0], square * stress[:, 1]
+    xx = square * (lateral + slope**2 * vertical)
+    yy = square * (vertical + slope**2 * lateral)
+    xy = square * slope * (lateral - vertical)
+    return square, np.stack([xx, yy, square * stress[:, 2], xy], axis=1)
+
+
+def _shared_slope(scenario: Scenario, outline: geometry.Polygon, position: Array) -> Array:
+    """Slope dy/dx [N] that a body's surface and the ground share at each of its points: the lesser of the two where
+    both fall to one side."""
+    if scenario.ground is None or scenario.ground.level:
+        return np.zeros(len(position))
+    surface, ground = geometry.surface_slope(outline, position), scenario.ground.slope(position[:, 0])
+    return np.where(surface * ground > 0.0, np.sign(ground) * np.minimum(np.abs(surface), np.abs(ground)), 0.0)
+
+
 def material_points(scenario: Scenario) -> MaterialPoints:
     """The scenario's flow as material points, with masses and initial stress: what is there at the start, what lies
     there, and what arrives, in this order.
@@ -238,26 +260,26 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
     share of the weight; the vertical effective stress carries the rest, and the horizontal ones are K0 times it.
     Gravity's component along the ground is left out of the initial stress.
+
+    Over a profile the stress is that of a long slope of the angle alpha that surface and ground share, the lesser of
+    the two where both fall to one side: normal to the slope, cos² alpha of what lies above, and K0 along it. Under a
+    level surface it is the whole, whatever the ground: a pond is at rest. What arrives has the slope of the ground.
     """
     flow, numerics = scenario.flow, scenario.numerics
     parts: list[_Part] = []
     ratio, lateral = flow.initial_pore_pressure_ratio, flow.lateral_stress_ratio
     if flow.shape is not None:
-        polygon = flow.shape.polygon
-        position, volume = fill_polygon(polygon, numerics.spacing_m, numerics.points_per_cell)
-        below = geometry.depth_below_surface(polygon, position)
-        parts.append(_Part(position, volume, below, ratio, lateral, flow.velocity_m_per_s))
+        parts.append(_Part(*_filled(scenario, flow.shape.polygon), ratio, lateral, flow.velocity_m_per_s))
     for deposit in flow.deposits:
-        polygon, own = deposit.shape.polygon, deposit.lateral_stress_coefficient
-        position, volume = fill_polygon(polygon, numerics.spacing_m, numerics.points_per_cell)
-        below = geometry.depth_below_surface(polygon, position)
-        parts.append(_Part(position, volume, below, None, lateral if own is None else own))
+        own = deposit.lateral_stress_coefficient
+        parts.append(_Part(*_filled(scenario, deposit.shape.polygon), None, lateral if own is None else own))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
         own_ratio = ratio if coming.pore_pressure_ratio is None else coming.pore_pressure_ratio
-        parts.append(_Part(coming.position, coming.volume, coming.below, own_ratio, lateral))
+        slope = np.full(len(coming.volume), flow.inflow.slope)
+        parts.append(_Part(coming.position, coming.volume, coming.below, slope, own_ratio, lateral))
         entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
     stresses = [_initial_stress(scenario, part) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
@@ -272,6 +294,13 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         entry=entry,
         pace=pace,
     )
+
+
+def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array, Array, Array]:
+    """Position, volume, depth below the surface and shared slope of the points of a body that is there at the start."""
+    position, volume = fill_polygon(outline, scenario.numerics.spacing_m, scenario.numerics.points_per_cell)
+    below = geometry.depth_below_surface(outline, position)
+    return position, volume, below, _shared_slope(scenario, outline, position)
 
 
 def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
@@ -289,4 +318,7 @@ def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
         vertical = -(material.density - borne) * downward * depth
         lateral = part.lateral_stress_ratio * vertical
         effective_stress[:, 0], effective_stress[:, 1], effective_stress[:, 2] = lateral, vertical, lateral
+        if part.slope.any():
+            square, effective_stress = _along_slope(part.slope, effective_stress)
+            pore_pressure = square * pore_pressure
     return effective_stress, pore_pressure

@@ -57,6 +57,8 @@ class Effects:
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
     arriving: bool = False
     """Some of the flow arrives at a section during the run."""
+    profile: bool = False
+    """The ground has many pieces, of which a point looks at those about its column of the grid alone."""
 
     @property
     def liquid(self) -> bool:
@@ -117,6 +119,7 @@ class Effects:
                 "joined",
                 "passing",
                 "arriving",
+                "profile",
             )
             if getattr(self, name)
         ]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.arrival_figures import arrival_figures, with_what_arrives
+from warp_mpm.barrier_figures import barrier_figures
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
@@ -365,7 +366,7 @@ def _summary(
     scenario: Scenario, series: Mapping[str, NDArray[np.float64]], snapshots: Any, record: dict[str, Any]
 ) -> dict[str, Any]:
     summary = summarize(scenario, with_what_arrives(scenario, series), snapshots, _of_the_run(record))
-    return summary | arrival_figures(scenario, series, summary)
+    return summary | arrival_figures(scenario, series, summary) | barrier_figures(scenario, series, snapshots)
 
 
 def _draw(results: Results, path: Path) -> None:
@@ -378,11 +379,11 @@ def _draw(results: Results, path: Path) -> None:
 
 
 def _write_surfaces(results: Results, path: Path) -> None:
-    """Barrier and ground beside the snapshots, as far as the material reaches."""
+    """Barriers and ground beside the snapshots, as far as the material reaches."""
     snapshots = results.snapshots
     displacements, edges = [], []
     for snapshot in snapshots:
-        displacements.append(snapshot.barrier_displacement)
+        displacements.append(results.barrier_displacements(snapshot))
         x, y = snapshot.position.T if len(snapshot.position) else np.zeros((2, 1))
         edges.append((x.min(), x.max(), y.max()))
     if edges:

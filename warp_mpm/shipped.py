@@ -17,11 +17,6 @@ def scenario_files() -> dict[str, Path]:
     return {file.relative_to(SCENARIOS).with_suffix("").as_posix(): file for file in files}
 
 
-def tables_of(scenario: Path) -> list[Path]:
-    """The tables that a scene of the program reads, beside it and named as it is."""
-    return sorted(scenario.parent.glob(f"{scenario.stem}*.csv"))
-
-
 def where_to_get(missing: Path) -> str:
     """A sentence on how to come by a file that is missing, if one of that name comes with the program; or nothing."""
     names = {file.name for file in scenario_files().values()}

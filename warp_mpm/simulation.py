@@ -244,6 +244,8 @@ class Simulation:
         self._kernels_of_a_step: tuple[str, ...] = ()
         self._ledger_graph: Any = None
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
+        further = {one.name for one in scenario.barriers}
+        self._further = [number for number, body in enumerate(self.bodies) if body.name in further]
         self._quantities = sampled_quantities(scenario, self.bodies)
         self._since = self.window()
         """When the last call of `advance` that made a step began."""
@@ -301,7 +303,7 @@ class Simulation:
     def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
         kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
-        if self._commands is not None:
+        if self._commands is not None and command is not None:  # of no threads there is none
             self._commands.append((launch.kernel, command))
         if self._on_launch is not None:
             self._on_launch(launch.kernel)
@@ -567,8 +569,8 @@ class Simulation:
         x, y = self._read(field)[names.index(name)]
         return float(x), float(y)
 
-    def _barrier_number(self, field: str) -> float:
-        return float(self._read(field)[self._barrier]) if field in self._body_arrays else 0.0
+    def _number_of(self, body: int, field: str) -> float:
+        return float(self._read(field)[body]) if field in self._body_arrays else 0.0
 
     def set_barrier_velocity(self, velocity: float) -> None:
         """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion.
@@ -651,7 +653,7 @@ class Simulation:
         return Window(
             self._clock_entry(at.TIME),
             self._read("reactions").tolist(),
-            self._barrier_number("base_impulse"),
+            self._number_of(self._barrier, "base_impulse"),
             self._read("turned").tolist(),
             self._read("taken").copy(),
             reach=self.scenario.output.pressure_patch_s,
@@ -695,17 +697,18 @@ class Simulation:
                 )
         return values if names is None else {key: values[key] for key in values if key == "time" or key in names}
 
+    def _motion_of(self, number: int) -> BarrierNow:
+        body = self.bodies[number]
+        return BarrierNow(
+            self.body_displacement(body.name)[0],
+            self.body_velocity(body.name)[0],
+            self._number_of(number, "work"),
+            self._number_of(number, "base_work"),
+            body.motion.mass if isinstance(body.motion, Sliding) else 0.0,
+        )
+
     def _now(self, now: Window, since: Window, sums: Sequence[float]) -> Now:
-        barrier = BarrierNow()
-        if self._barrier is not None:
-            motion = self.bodies[self._barrier].motion
-            barrier = BarrierNow(
-                self.body_displacement(BARRIER)[0],
-                self.body_velocity(BARRIER)[0],
-                self._barrier_number("work"),
-                self._barrier_number("base_work"),
-                motion.mass if isinstance(motion, Sliding) else 0.0,
-            )
+        barrier = self._motion_of(self._barrier) if self._barrier is not None else BarrierNow()
         forces, base_force = mean_forces(self.bodies, now, since)
         loads = (
             None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, self._patches, now, since)
@@ -714,6 +717,7 @@ class Simulation:
             scenario=self.scenario,
             bodies=self.bodies,
             barrier=barrier,
+            further={self.bodies[number].name: self._motion_of(number) for number in self._further},
             time=self.time,
             time_step=self._clock_entry(at.TIME_STEP),
             elapsed=now.time - since.time,

@@ -123,7 +123,10 @@ def test_what_is_no_inflow_gets_one_sentence(change, sentence):
     ("changes", "sentence"),
     [
         ({"domain.left_m": -11.0}, "x_m = -10 has no room upstream: domain.left_m = -11 must be at most -12, 4 cells"),
-        ({"domain.top_m": 6.5, "flow.inflow.depths_m": [0, 7, 2, 0]}, "domain.top_m = 6.5 cuts the scene; it must be at least 7"),
+        (
+            {"domain.top_m": 6.5, "flow.inflow.depths_m": [0, 7, 2, 0]},
+            "domain.top_m = 6.5 cuts the scene; it must be at least 7",
+        ),
         ({"output.end_time_s": 0.5}, "times_s begins at 0.5, when the run has ended"),
         (
             {"flow.shape": {"kind": "front_and_tail", "depth_m": 1, "squares": 0, "distance_m": 8},
@@ -131,7 +134,7 @@ def test_what_is_no_inflow_gets_one_sentence(change, sentence):
             "x_m = -10 lies inside flow.shape, which begins at x = -12; it must be at most that",
         ),
         (
-            {"flow.deposits": [{"shape": {"kind": "block", "left_m": -11, "right_m": -9, "height_m": 1}}]},
+            {"flow.deposits": [{"shape": {"kind": "on_ground", "from_m": -11, "to_m": -9, "depth_m": 1}}]},
             r"x_m = -10 lies inside flow.deposits\[0\]",
         ),
         (
@@ -257,7 +260,7 @@ def test_mass_momentum_and_energy_of_what_arrives_are_accounted_for(arrived):
 
 
 def test_snapshots_hold_what_has_arrived_and_no_more(arrived):
-    scenario, run = arrived
+    _, run = arrived
     assert len(run.snapshots[0].position) == 0
     counts = [len(snapshot.position) for snapshot in run.snapshots]
     assert (np.diff(counts) >= 0).all()

@@ -87,14 +87,17 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
 
     @wp.func
     def prescribed(x: wp.float64, y: wp.float64, speed: wp.float64, stretch: wp.float64, arrival: Arrival) -> V2:
-        """Velocity at a place of the approach: what differs along x leaves upward, or is fed from above."""
-        return V2(F(speed + stretch * (x - arrival.section)), F(-stretch * (y - arrival.base)))
+        """Velocity at a place of the approach: along the ground; what differs along x leaves upward, or is fed from
+        above."""
+        way = x - arrival.section
+        along = speed + stretch * way
+        return V2(F(along), F(arrival.slope * along - stretch * (y - (arrival.base + arrival.slope * way))))
 
     @wp.func
     def push(
         points: Points, p: wp.int32, x: V2, pace: wp.float64, parameters: Parameters, arrival: Arrival, dt: wp.float64
     ):
-        """Give to the flow what the nodes gave to a point that is held, but for gravity's share: action and reaction."""
+        """Give to the flow what the nodes gave to a point that is held, but for gravity's share."""
         half = wp.float64(0.5)
         g = dt * wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
         speed = pace * arrival.conveyed[wp.static(CONVEYED_SPEED_BEFORE)]
@@ -145,12 +148,15 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         x = read(points.position, p)
         way = arrival.conveyed[wp.static(CONVEYED_WAY)]
         at = wp.float64(x[0]) + pace * way
+        # Points that wait are kept at the height that they have at the section.
+        high = wp.float64(x[1])
         if state == wp.static(HELD):
             at -= pace * arrival.conveyed[wp.static(CONVEYED_BEFORE)]
+            high -= arrival.slope * (wp.float64(x[0]) - arrival.section)
             push(points, p, x, pace, parameters, arrival, book.clock[wp.static(TIME_STEP)])
         elif at < arrival.entry:
             return
-        place = V2(F(at), x[1])
+        place = V2(F(at), F(high + arrival.slope * (at - arrival.section)))
         margin = F(2.0)
         sx = (place[0] - parameters.left - F(grid.shift[1])) * parameters.inverse_spacing
         sy = (place[1] - parameters.bottom) * parameters.inverse_spacing
@@ -158,7 +164,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             sx >= margin and sx < F(parameters.columns) - margin and sy >= margin and sy < F(parameters.rows) - margin
         ):
             # A grid that rides with the barrier may have left it behind: it comes when the conveyor has caught up.
-            write(points.position, p, V2(F(at - pace * way), x[1]))
+            write(points.position, p, V2(F(at - pace * way), F(high)))
             points.inside[p] = wp.static(WAITING)
             rest(points, p)
             return

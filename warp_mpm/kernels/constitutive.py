@@ -65,6 +65,7 @@ def make_constitutive(
     Book = types.Book
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
+    about = bodies_of.about if BODIES else None
     RESTING = not effects.passing
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
@@ -172,8 +173,7 @@ def make_constitutive(
                         seen = x
                         if MOVING:
                             seen -= read(bodies.next, body)
-                        first_piece = read(bodies.first_piece, body)
-                        last_piece = read(bodies.first_piece, body + 1)
+                        first_piece, last_piece = about(bodies, body, wp.int32(sx), parameters.columns)
                         pushed = set_back(bodies.pieces, first_piece, last_piece, seen, F(-0.5) * parameters.spacing)
                         if pushed[0] != F(0.0) or pushed[1] != F(0.0):
                             x += pushed

@@ -296,7 +296,8 @@ def layout(effects: Effects) -> SimpleNamespace:
             "conveyed": array(dtype=wp.float64),
             "inflow": array(dtype=wp.float64),
             "section": wp.float64,  # x [m]
-            "base": wp.float64,  # y of the underside [m]
+            "base": wp.float64,  # y of the underside at the section [m]
+            "slope": wp.float64,  # dy/dx of the ground beneath the approach
             "entry": wp.float64,  # x of the upstream end of the approach [m]
             "fastest": wp.float64,  # greatest velocity of the table, at any height [m/s]
         }

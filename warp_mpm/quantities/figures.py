@@ -198,6 +198,12 @@ _ROWS = (
             *("left_energy", "barrier_work", "seepage_work", "inflow_energy"),
         ),
     ),
+    Figure(
+        "barriers", "-",
+        "of a scene with further barriers: a row for each, from upstream to downstream, with the force on the whole of "
+        "it, its motion, the volumes held before and passed beyond its crest at the end, and how far from its heel the "
+        "first of what passed was on the ground (docs/how_to/site.md)",
+    ),
     Figure("wall_time", "s", "wall time of the run, its preparation left out", "wall time"),
 )  # fmt: skip
 

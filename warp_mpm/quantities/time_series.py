@@ -46,7 +46,7 @@ def arriving(scenario: Any) -> bool:
 
 def ended_barrier(scenario: Any) -> bool:
     """Scenes whose barrier has a base with two ends."""
-    return barrier(scenario) and scenario.barrier.shape.kind == "trapezoid"
+    return barrier(scenario) and scenario.barrier.shape.kind != "wall"
 
 
 def pressed_by_liquid(scenario: Any) -> bool:
@@ -87,6 +87,36 @@ def force_of_surface(surface: str, axis: str) -> Sampled:
     words = f"force on {surface} along {axis}"
     name = f"{surface}_force_{axis}"
     return Sampled(name, "N/m", meaning, words, read=_force(surface, axis), of_points=False, mean=True)
+
+
+FURTHER = {
+    "barrier_displacement": ("m", "displacement of the barrier {name} along x", "displacement of {name}"),
+    "barrier_velocity": ("m/s", "velocity of the barrier {name} along x", "velocity of {name}"),
+    "barrier_work": ("J/m", "work done by the flow on the barrier {name} since t = 0", "work done on {name}"),
+}
+"""What is told of each further barrier that moves: unit, meaning, words; its columns are `NAME_barrier_displacement`
+and so on."""
+
+
+def of_further_barrier(name: str, what: str) -> Sampled:
+    """A row of `FURTHER` of the barrier `name`."""
+    unit, meaning, words = (text.format(name=name) for text in FURTHER[what])
+    field = what.removeprefix("barrier_")
+    return Sampled(
+        f"{name}_{what}", unit, meaning, words,
+        read=lambda now: getattr(now.further[name], field), of_points=False,
+    )  # fmt: skip
+
+
+def further_quantities(scenario: Any) -> dict[str, Sampled]:
+    """What a scene tells of its further barriers, by key: force on the whole of each, and how it moves."""
+    found: dict[str, Sampled] = {}
+    for one in getattr(scenario, "barriers", ()):
+        rows = [force_of_surface(one.name, axis) for axis in "xy"]
+        if one.motion.kind != "fixed":
+            rows += [of_further_barrier(one.name, what) for what in FURTHER]
+        found |= {row.key: row for row in rows}
+    return found
 
 
 _ROWS = (
@@ -323,12 +353,15 @@ NAMED: Mapping[str, Sampled] = {row.name: row for row in _ROWS}
 
 
 def quantity_of_column(name: str) -> Quantity | None:
-    """Of a column of `timeseries.csv` by its name: of the table, of a script, or a force on a surface of its bodies;
-    None where there is no such column."""
+    """Of a column of `timeseries.csv` by its name: of the table, of a script, of a further barrier, or a force on a
+    surface of its bodies; None where there is no such column."""
     if name in NAMED:
         return NAMED[name]
     if name in OWN:
         return OWN[name]
+    for what in FURTHER:
+        if name.endswith(f"_{what}"):
+            return of_further_barrier(name.removesuffix(f"_{what}"), what)
     surface, _, axis = name.rpartition("_force_")
     return force_of_surface(surface, axis) if surface and axis in ("x", "y") else None
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mpm import geometry
-from warp_mpm.scenario.barrier import Prescribed, Sliding, Trapezoid, Wall
-from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.scenario.barrier import Prescribed, Sliding, Trapezoid
+from warp_mpm.scenario.inflow import APPROACH, Inflow
+from warp_mpm.scenario.site import all_standing, lowest_ground, site_problems
 
 if TYPE_CHECKING:
     from warp_mpm.scenario.scene import Scenario
@@ -32,17 +33,23 @@ BYTES_PER_POINT = 500
 """Rough memory of one material point in a two-phase run, grid and output included."""
 
 
+STRAIGHT = 1e-3
+"""Cells by which the ground before the section of an inflow may be off a straight line: what is held there at 10 m/s
+then meets it across at 1 cm/s at most, which gravity gives it in a step."""
+
+
 def problems(scenario: Scenario) -> list[str]:
     """All that makes the scene impossible; empty where nothing does."""
-    found = [*_misplaced_flow(scenario), *_misplaced_inflow(scenario), *_misplaced_deposits(scenario)]
+    found = [*site_problems(scenario), *_misplaced_inflow(scenario), *_misplaced_deposits(scenario)]
     found += [*_impossible_domain(scenario), *_excessive_size(scenario)]
     barrier = scenario.barrier
     if scenario.ground is None and barrier is not None and isinstance(barrier.motion, Sliding):
         found.append("ground = null is not allowed with a sliding barrier, which needs a base to slide on")
     elif scenario.ground is None and barrier is not None and isinstance(barrier.shape, Trapezoid):
         found.append(
-            'ground = null is not allowed with barrier.shape of the kind "trapezoid", which has no underside and would '
-            'lift what flows beneath it; give a ground, or the kind "wall", which has no end below either'
+            f'ground = null is not allowed with barrier.shape of the kind "{barrier.shape.kind}", which has no '
+            'underside and would lift what flows beneath it; give a ground, or the kind "wall", which has no end below '
+            "either"
         )
     inertial = getattr(scenario.flow.material, "inertial_drag_coefficient", 0.0)
     if scenario.numerics.drag == "explicit" and inertial > 0.0:
@@ -64,48 +71,19 @@ def problems(scenario: Scenario) -> list[str]:
     return found
 
 
-def _misplaced_flow(scenario: Scenario) -> list[str]:
-    if scenario.flow.shape is None:
-        return []
-    return _misplaced(scenario, "flow.shape", scenario.flow.shape.polygon)
-
-
-def _misplaced(scenario: Scenario, name: str, outline: geometry.Polygon) -> list[str]:
-    """A body of flow below the ground or inside the barrier."""
-    problems = []
-    lowest = float(outline[:, 1].min())
-    # A hair below is rounding of the user's own arithmetic.
-    hair = 1e-9 * max(1.0, float(np.abs(outline).max()))
-    if scenario.ground is not None and lowest < -hair:
-        problems.append(f"{name} reaches y = {lowest:g} m; it must stay on or above the ground, y >= 0")
-    if scenario.barrier is not None:
-        if isinstance(scenario.barrier.shape, Wall):
-            inside = geometry.clip_half_plane(outline, (-1.0, 0.0), 0.0)
-        else:
-            inside = geometry.clip_convex(outline, scenario.barrier.shape.polygon)
-        overlap = geometry.area(inside) if len(inside) else 0.0
-        if overlap > hair * scenario.flow.depth:
-            problems.append(
-                f"{name} lies inside the barrier by {overlap:.3g} m³/m; it must lie outside "
-                "(the barrier's toe is at x = 0 and its body at x >= 0)"
-            )
-    return problems
-
-
 def _misplaced_deposits(scenario: Scenario) -> list[str]:
-    """Deposits below the ground, inside the barrier, or where something else lies."""
-    flow, spacing, problems = scenario.flow, scenario.numerics.spacing_m, []
-    bodies = [(f"flow.deposits[{place}]", deposit.shape.polygon) for place, deposit in enumerate(flow.deposits)]
-    for name, outline in bodies:
-        problems += _misplaced(scenario, name, outline)
+    """Deposits too small for a point, or where something else lies."""
+    spacing, problems = scenario.numerics.spacing_m, []
+    bodies = scenario.flow.bodies
+    if scenario.flow.shape is not None:
+        bodies = [*bodies[1:], bodies[0]]
+    for name, outline in bodies[: len(scenario.flow.deposits)]:
         volume = geometry.area(outline)
         if volume / spacing**2 * scenario.numerics.points_per_cell < 1.0:
             problems.append(
                 f"numerics.spacing_m = {spacing:g} leaves less than one material point for {name} of {volume:.3g} "
                 "m³/m; it must be smaller"
             )
-    if flow.shape is not None:
-        bodies.append(("flow.shape", flow.shape.polygon))
     for place, (name, outline) in enumerate(bodies):
         for other, another in bodies[place + 1 :]:
             if _overlap(outline, another, spacing):
@@ -132,15 +110,13 @@ def _misplaced_inflow(scenario: Scenario) -> list[str]:
     if inflow is None:
         return []
     problems, section = [], f"flow.inflow.x_m = {inflow.x_m:g}"
-    if scenario.ground is not None and inflow.base_m < 0.0:
-        problems.append(f"flow.inflow.base_m = {inflow.base_m:g} lies below the ground; it must be at least 0")
+    if scenario.ground is not None:
+        problems += _uneven_approach(scenario, inflow)
     reach = -_travel_upstream(scenario) if scenario.barrier is not None else np.inf
     if inflow.x_m >= reach:
         way = f", which is driven to x = {reach:g}" if reach < 0.0 else " at x = 0"
         problems.append(f"{section} does not lie upstream of the barrier{way}; it must be less")
-    bodies = [("flow.shape", flow.shape.polygon)] if flow.shape is not None else []
-    bodies += [(f"flow.deposits[{place}]", deposit.shape.polygon) for place, deposit in enumerate(flow.deposits)]
-    for name, outline in bodies:
+    for name, outline in flow.bodies:
         first = float(outline[:, 0].min())
         if first < inflow.x_m - 1e-9 * max(1.0, abs(first)):
             problems.append(f"{section} lies inside {name}, which begins at x = {first:g}; it must be at most that")
@@ -160,6 +136,35 @@ def _misplaced_inflow(scenario: Scenario) -> list[str]:
     return problems
 
 
+def _uneven_approach(scenario: Scenario, inflow: Inflow) -> list[str]:
+    """An inflow below its ground, or on one that is not straight before the section.
+
+    What is held there is given its velocity anew in every step: along a ground that turns, it would be driven into it
+    as often.
+    """
+    assert scenario.ground is not None
+    section, (first, last) = f"flow.inflow.x_m = {inflow.x_m:g}", scenario.ground.ends
+    if not first <= inflow.x_m <= last:
+        return [f"{section} lies beyond the ground's profile; it must be from {first:g} to {last:g}"]
+    if inflow.base < inflow.bed - 1e-9 * max(1.0, abs(inflow.bed)):
+        return [
+            f"flow.inflow.base_m = {inflow.base_m:g} lies below the ground; it must be at least {inflow.bed:g}, or null"
+        ]
+    begin = inflow.x_m - APPROACH * scenario.numerics.spacing_m
+    x, y = scenario.ground.profile.T
+    within = (x > begin) & (x <= inflow.x_m)
+    x, y = np.append(begin, x[within]), np.append(scenario.ground.height(begin), y[within])
+    apart = np.abs(y - inflow.bed - inflow.slope * (x - inflow.x_m))
+    off = np.flatnonzero(apart > STRAIGHT * scenario.numerics.spacing_m)
+    if not len(off):
+        return []
+    turn = np.append(x, inflow.x_m)[off[-1] + 1]
+    return [
+        f"{section} needs straight ground before it, from x = {begin:g} on ({APPROACH} cells); the profile turns at "
+        f"x = {turn:g}"
+    ]
+
+
 def _travel_upstream(scenario: Scenario) -> float:
     """How far a driven barrier comes upstream until the end [m]."""
     motion = scenario.barrier.motion if scenario.barrier is not None else None
@@ -176,13 +181,11 @@ def _extent(scenario: Scenario) -> tuple[float, float, float, float]:
     outline = np.concatenate(scenario.flow.outlines)
     x_low, y_low = outline.min(axis=0)
     x_high, y_high = outline.max(axis=0)
-    if scenario.barrier is not None:
-        x_low = min(x_low, 0.0)
-        if isinstance(scenario.barrier.shape, Trapezoid):
-            base, _, height = scenario.barrier.shape.base_crest_height
-            x_high, y_high = max(x_high, base), max(y_high, height)
-        else:
-            x_high = max(x_high, 0.0)
+    for _, x, _, standing in all_standing(scenario):
+        x_low, x_high = min(x_low, x), max(x_high, x)
+        if standing is not None:
+            x_low, x_high = min(x_low, standing[:, 0].min()), max(x_high, standing[:, 0].max())
+            y_high = max(y_high, standing[:, 1].max())
     return float(x_low), float(x_high), float(y_low), float(y_high)
 
 
@@ -198,7 +201,8 @@ def _impossible_domain(scenario: Scenario) -> list[str]:
         problems.append(f"domain.top_m = {domain.top_m:g} cuts the scene; it must be at least {y_high:g}")
     if domain.bottom_m is not None:
         if scenario.ground is not None:
-            problems.append("domain.bottom_m is not allowed with a ground, which is the lower edge at y = 0")
+            where = " at y = 0" if scenario.ground.level else ""
+            problems.append(f"domain.bottom_m is not allowed with a ground, which is the lower edge{where}")
         elif domain.bottom_m > y_low:
             problems.append(f"domain.bottom_m = {domain.bottom_m:g} cuts the scene; it must be at most {y_low:g}")
     return problems
@@ -225,7 +229,7 @@ def _excessive_size(scenario: Scenario) -> list[str]:
         asked if asked is not None else fitted
         for asked, fitted in zip(given, (x_low, x_high, y_low, y_high), strict=True)
     )
-    low = 0.0 if scenario.ground is not None else low
+    low = lowest_ground(scenario, left, right) if scenario.ground is not None else low
     nodes = (right - left) * (high - low) / scenario.numerics.spacing_m**2
     if nodes > LARGEST_GRID:
         problems.append(

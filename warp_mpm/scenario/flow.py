@@ -13,9 +13,21 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
+from warp_mpm.scenario.ground import Ground
 from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import AsWhole, Coordinate, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.schema import (
+    AsWhole,
+    Coordinate,
+    Density,
+    Length,
+    Model,
+    NonNegative,
+    Point,
+    Positive,
+    Velocity,
+    set_fields,
+)
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
@@ -76,40 +88,64 @@ class FlowPolygon(Model):
         return np.array(self.vertices_m)
 
 
-class Block(Model):
-    """An upright rectangle on the ground."""
+class FlowOnGround(Model):
+    """What lies on the ground, whatever its profile: made into a polygon when the scenario is read."""
 
-    kind: Literal["block"]
-    left_m: Coordinate
-    """x of its upstream side."""
-    right_m: Coordinate
-    """x of its downstream side."""
-    height_m: Annotated[float, Field(ge=NARROWEST, le=1e6)]
-    """Its height."""
+    kind: Literal["on_ground"]
+    from_m: Coordinate
+    """x of its tail."""
+    to_m: Coordinate
+    """x of its front."""
+    depth_m: Length
+    """Upright depth between tail and front."""
+    tail_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth grows from nothing at the tail; 0: an upright end."""
+    front_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth goes down to nothing at the front."""
 
     @model_validator(mode="after")
-    def _wide(self) -> Self:
-        if not self.right_m - self.left_m >= NARROWEST:
+    def _long_enough(self) -> Self:
+        if not self.to_m - self.from_m >= max(self.tail_m + self.front_m, NARROWEST):
             raise ValueError(
-                f"right_m = {self.right_m:g} must lie downstream of left_m = {self.left_m:g}, by at least "
-                f"{NARROWEST:g} m"
+                f"to_m = {self.to_m:g} must be at least {max(self.tail_m + self.front_m, NARROWEST):g} m, tail_m and "
+                f"front_m, beyond from_m = {self.from_m:g}"
             )
         return self
 
     @property
     def polygon(self) -> geometry.Polygon:
-        """Vertices [4, 2] in metres."""
-        left, right, top = self.left_m, self.right_m, self.height_m
-        return np.array([[left, 0.0], [right, 0.0], [right, top], [left, top]])
+        """Vertices [V, 2] in metres on level ground."""
+        return self.over(Ground()).polygon
+
+    def over(self, ground: Ground) -> FlowPolygon:
+        """Its outline over `ground`, anticlockwise from the tail."""
+        x = ground.profile[:, 0]
+        ends = [[place, float(ground.height(place))] for place in (self.from_m, self.to_m)]
+        lower = np.concatenate([ends[:1], ground.profile[(x > self.from_m) & (x < self.to_m)], ends[1:]])
+        top = np.unique([*lower[:, 0], self.from_m + self.tail_m, self.to_m - self.front_m])
+        depth = np.full(len(top), self.depth_m)
+        if self.tail_m:
+            depth *= np.clip((top - self.from_m) / self.tail_m, 0.0, 1.0)
+        if self.front_m:
+            depth *= np.clip((self.to_m - top) / self.front_m, 0.0, 1.0)
+        upper = np.stack([top, ground.height(top) + depth], axis=1)
+        outline = np.concatenate([lower, upper[depth > 0.0][::-1]])
+        return FlowPolygon(kind="polygon", vertices_m=outline.tolist())
 
 
 class Deposit(Model):
     """What lies there at the start, of the flow's material: the deposit of an earlier surge."""
 
-    shape: Annotated[Block | FlowPolygon, Field(discriminator="kind")]
+    shape: Annotated[FlowPolygon | FlowOnGround, Field(discriminator="kind")]
     """Its outline."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow."""
+
+    def laid_on(self, ground: Ground) -> Self:
+        """The same deposit as a polygon over `ground`, where it is of the kind on_ground."""
+        if not isinstance(self.shape, FlowOnGround):
+            return self
+        return self.model_copy(update={"shape": self.shape.over(ground)})
 
 
 class Skeleton(Model):
@@ -233,7 +269,7 @@ class TwoPhaseMaterial(UndrainedMaterial):
 
 
 class _FlowBase(Model):
-    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")] | None = None
+    shape: Annotated[FrontAndTail | FlowPolygon | FlowOnGround, Field(discriminator="kind")] | None = None
     """Outline at t = 0; null of a flow that only arrives (`inflow`)."""
     velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)] = (0.0, 0.0)
     """Uniform velocity [x, y] at t = 0, of both phases; it must be given with a shape."""
@@ -272,6 +308,23 @@ class _FlowBase(Model):
             )
         return self
 
+    def laid_on(self, ground: Ground) -> Self:
+        """The same flow over `ground`: what lies on it as a polygon, and the section of what arrives at its height."""
+        changes: dict[str, Any] = {}
+        if isinstance(self.shape, FlowOnGround):
+            changes["shape"] = self.shape.over(ground)
+        if any(isinstance(deposit.shape, FlowOnGround) for deposit in self.deposits):
+            changes["deposits"] = tuple(deposit.laid_on(ground) for deposit in self.deposits)
+        if self.inflow is not None:
+            changes["inflow"] = self.inflow.laid_on(ground)
+        return self.model_copy(update=changes) if changes else self
+
+    @property
+    def bodies(self) -> list[tuple[str, geometry.Polygon]]:
+        """Field and outline [V, 2] [m] of everything that is there at t = 0."""
+        found = [("flow.shape", self.shape.polygon)] if self.shape is not None else []
+        return found + [(f"flow.deposits[{k}]", deposit.shape.polygon) for k, deposit in enumerate(self.deposits)]
+
     @property
     def polygon(self) -> geometry.Polygon:
         """Outline at t = 0, vertices [V, 2] in metres; of a flow that only arrives the box of its volume and depth that
@@ -279,17 +332,16 @@ class _FlowBase(Model):
         if self.shape is not None:
             return self.shape.polygon
         assert self.inflow is not None
-        right, low, depth = self.inflow.x_m, self.inflow.base_m, self.inflow.greatest_depth
+        right, low, depth = self.inflow.x_m, self.inflow.base, self.inflow.greatest_depth
         left = right - self.inflow.volume / depth
         return np.array([[left, low], [right, low], [right, low + depth], [left, low + depth]])
 
     @property
     def outlines(self) -> list[geometry.Polygon]:
         """All that is there at t = 0, vertices [V, 2] each [m], and of what arrives the section [2, 2]."""
-        found = [self.shape.polygon] if self.shape is not None else []
-        found += [deposit.shape.polygon for deposit in self.deposits]
+        found = [outline for _, outline in self.bodies]
         if self.inflow is not None:
-            x, low = self.inflow.x_m, self.inflow.base_m
+            x, low = self.inflow.x_m, self.inflow.base
             found.append(np.array([[x, low], [x, low + self.inflow.greatest_depth]]))
         return found
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from warp_mpm.scenario.ground import Ground
 from warp_mpm.schema import Coordinate, Length, Model, Series, Text
 
 Array = NDArray[np.float64]
@@ -42,18 +43,18 @@ class Inflow(Model):
     """A flow that arrives at an upright section, in one surge or several.
 
     Between the given times depth and velocity are linear; before the first and after the last nothing arrives, nor
-    where the depth is 0. What arrives has the flow's material and rests on `base_m`; its stress is that of a flow at
-    rest of its depth (`initial_stress`).
+    where the depth is 0. What arrives has the flow's material and moves along the ground at the section, which is
+    straight for some cells before it; its stress is that of a flow at rest of its depth (`initial_stress`).
     """
 
     x_m: Coordinate
     """x of the section."""
-    base_m: Coordinate = 0.0
-    """y of the flow's underside at the section."""
+    base_m: Coordinate | None = None
+    """y of the flow's underside at the section; null: the ground's height there."""
     times_s: Series | None = None
     """Times, increasing."""
     depths_m: Series | None = None
-    """Depths then, at least 0."""
+    """Depths then, upright, at least 0."""
     velocities_m_per_s: Series | None = None
     """Velocities then, along x, meant over the depth, at least 0."""
     velocity_m_per_s: Annotated[float, Field(gt=0.0, le=1e4)] | None = None
@@ -68,6 +69,8 @@ class Inflow(Model):
     """Velocity at the flow's underside over the mean over the depth; 1: the same at all heights."""
     velocity_exponent: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
     """m of the velocity s + (1 - s)(1 + m)(y / h)^m over the mean, with that share s at the underside; 1: linear."""
+
+    _bed: tuple[float, float] = (0.0, 0.0)
 
     @model_validator(mode="before")
     @classmethod
@@ -115,6 +118,35 @@ class Inflow(Model):
         if not self.volume > 0.0:
             raise ValueError("brings nothing: depth or velocity is 0 at all times")
         return self
+
+    # -- the section -----------------------------------------------------------------------------------------------
+
+    def laid_on(self, ground: Ground) -> Self:
+        """The same inflow over `ground`."""
+        laid = self.model_copy()
+        laid._bed = ground.before(self.x_m)
+        return laid
+
+    @property
+    def bed(self) -> float:
+        """y of the ground just before the section [m]."""
+        return self._bed[0]
+
+    @property
+    def base(self) -> float:
+        """y of the flow's underside at the section [m]."""
+        return self.bed if self.base_m is None else self.base_m
+
+    @property
+    def slope(self) -> float:
+        """dy/dx of the ground just before the section, along which the flow arrives."""
+        return self._bed[1]
+
+    def approach(self, spacing: float) -> Array:
+        """Outline [4, 2] of the approach filled to the greatest depth [m]."""
+        right, run = self.x_m, APPROACH * spacing
+        low = np.array([[right - run, self.base - self.slope * run], [right, self.base]])
+        return np.concatenate([low, low[::-1] + np.array([0.0, self.greatest_depth])])
 
     # -- the table -------------------------------------------------------------------------------------------------
 
@@ -204,8 +236,8 @@ class Inflow(Model):
 
     @property
     def greatest_speed(self) -> float:
-        """Of any height [m/s]."""
-        return float(self.velocities.max()) * float(self.paces(np.array([1.0]))[0])
+        """Of any height, along the ground [m/s]."""
+        return float(self.velocities.max()) * float(self.paces(np.array([1.0]))[0]) * math.hypot(1.0, self.slope)
 
     def paces(self, height: Array) -> Array:
         """Velocity over its mean over the depth, at heights [N] over the depth."""
@@ -271,15 +303,14 @@ def hydrograph(path: str, velocity: Any = None, width: Any = None) -> dict[str, 
                 value = math.nan
             if not math.isfinite(value):
                 raise ValueError(
-                    f"{shown}, line {number}: {word!r} in the column {rows[0][1][place].strip()} must be a finite number"
+                    f"{shown}, line {number}: {word!r} in the column {rows[0][1][place].strip()} must be a finite "
+                    "number"
                 )
             columns[what].append(value)
     return _table_of(shown, columns, velocity, width)
 
 
-def _table_of(
-    shown: str, columns: dict[str, list[float]], velocity: Any, width: Any
-) -> dict[str, tuple[float, ...]]:
+def _table_of(shown: str, columns: dict[str, list[float]], velocity: Any, width: Any) -> dict[str, tuple[float, ...]]:
     table = {what: tuple(values) for what, values in columns.items() if what != "discharge"}
     if "velocities_m_per_s" in table and velocity is not None:
         raise ValueError(f"{shown} has a column of the velocity; velocity_m_per_s = {velocity} must then be left out")
@@ -313,7 +344,9 @@ def _divided(discharge: list[float] | None, width: float, by: list[float]) -> tu
     """Discharge per metre of width over a depth, or a velocity; 0 where there is none."""
     if discharge is None:
         return None
-    return tuple(q / width / other if q != 0.0 and other != 0.0 else 0.0 for q, other in zip(discharge, by, strict=True))
+    return tuple(
+        q / width / other if q != 0.0 and other != 0.0 else 0.0 for q, other in zip(discharge, by, strict=True)
+    )
 
 
 def _plain(name: str) -> str:

@@ -84,7 +84,8 @@ def arrival_arrays(scenario: Scenario, types: SimpleNamespace, *, device: Any) -
         "ways": inflow.ways,
         "stretches": inflow.stretches,
         "section": inflow.x_m,
-        "base": inflow.base_m,
+        "base": inflow.base,
+        "slope": inflow.slope,
         "entry": inflow.x_m - APPROACH * scenario.numerics.spacing_m,
         "fastest": inflow.greatest_speed,
     }

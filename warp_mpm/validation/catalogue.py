@@ -18,6 +18,7 @@ from warp_mpm.validation import (
     refinement,
     rheology,
     shallow_water,
+    sites,
 )
 from warp_mpm.validation.case import Case
 
@@ -30,6 +31,7 @@ CASES: tuple[Case, ...] = (
     *free_motion.CASES,
     *jets.CASES,
     *shallow_water.CASES,
+    *sites.CASES,
     *granular.CASES,
     *rheology.CASES,
     *case_one.CASES,
