@@ -18,6 +18,7 @@ from warp_mpm.kernels import layout as at
 from warp_mpm.run import run_in_memory, run_scenario
 from warp_mpm.scenario.site import standing_outline
 from warp_mpm.scenario_errors import ScenarioError
+from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulator.bodies import Outline
 from warp_mpm.simulator.bodies.arrays import effects_of
 from warp_mpm.validation.scenes import material
@@ -164,6 +165,16 @@ def test_a_profile_comes_from_a_table_or_a_line_of_a_map(tmp_path):
     assert scenes["slope.csv"].ground.profile.tolist() == SLOPE
     # The way along the line, 5 m for each step of 3 and 4, and the height; both from the origin.
     assert scenes["line.geojson"].ground.profile.tolist() == [[-5, 3], [0, 0], [15, -5]]
+
+
+def test_a_unit_holds_the_points_of_the_table(tmp_path):
+    from fmu.archive import SCENARIO, _simulator_resources
+
+    file = SCENARIOS / "site_channel.json"
+    packed = json.loads(_simulator_resources(file)[SCENARIO])
+    assert Scenario.model_validate(packed) == Scenario.load(file)
+    plain = SCENARIOS / "site_two_barriers.json"
+    assert _simulator_resources(plain)[SCENARIO] == plain.read_bytes()
 
 
 @pytest.mark.parametrize(
