@@ -14,13 +14,15 @@ from warp_mpm.barrier_figures import barrier_figures
 from warp_mpm.discretization import material_points
 from warp_mpm.effect_rules import derive_effects
 from warp_mpm.extent import domain_extent
+from warp_mpm.grid import fit_grid
 from warp_mpm.kernels import layout as at
 from warp_mpm.run import run_in_memory, run_scenario
 from warp_mpm.scenario.site import standing_outline
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulator.bodies import Outline
-from warp_mpm.simulator.bodies.arrays import effects_of
+from warp_mpm.simulator.bodies.arrays import effects_of, pieces_by_column
+from warp_mpm.simulator.bodies.kernels import RUBBED
 from warp_mpm.validation.scenes import material
 
 SLOPE = [[-40, 12], [-20, 6], [0, 0], [15, 0], [20, -2], [40, -4]]
@@ -235,6 +237,23 @@ def test_near_a_long_profile_only_the_pieces_about_a_place_count():
     for one, other in zip(whole, near, strict=True):
         assert np.array_equal(one[close], other[close])
     assert np.array_equal(np.sign(whole[0]), np.sign(near[0]))
+
+
+def test_every_column_knows_the_pieces_about_it():
+    random = np.random.default_rng(2)
+    x = np.sort(random.uniform(-40, 40, 60))
+    pieces = Outline(np.stack([x, np.cumsum(random.normal(0, 0.5, 60))], axis=1), closed=False).segments
+    grid = fit_grid(site())
+    near = pieces_by_column(pieces, grid)
+    place = random.uniform(-39, 39, (20_000, 2))
+    place[:, 1] = np.interp(place[:, 0], pieces.begin[:, 0], pieces.begin[:, 1]) + random.uniform(-2, 2, 20_000)
+    distance, _, nearest = pieces.nearest(place)
+    column = np.floor((place[:, 0] - grid.left) / grid.spacing).astype(int)
+    known = (np.abs(distance) < RUBBED * grid.spacing) & (column >= 0) & (column < grid.columns)
+    first, last = near[column[known]].T
+    assert known.sum() > 5000
+    assert ((first <= nearest[known]) & (nearest[known] < last)).all()
+    assert (last - first).max() < 30
 
 
 def test_stress_at_rest_is_that_of_a_tilted_layer_and_of_a_pond():
