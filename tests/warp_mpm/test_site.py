@@ -321,8 +321,8 @@ def test_a_level_profile_is_level_ground():
 
 
 def test_a_slope_of_many_pieces_is_a_slope():
-    """Points look at the pieces about their column alone. Places of contact lie a little otherwise along shorter pieces:
-    that moves points by up to 7 mm on their way of 3.4 m."""
+    """Points look at the pieces about their column alone. Places of contact lie a little otherwise along shorter
+    pieces: that moves points by up to 7 mm on their way of 3.4 m."""
     found = []
     shape = {"kind": "polygon", "vertices_m": [[-16, 4.8], [-6, 1.8], [-6, 4], [-16, 7]]}
     flow = content()["flow"] | {"shape": shape}
