@@ -195,10 +195,20 @@ def _simulator_resources(scenario: Path) -> dict[str, bytes]:
         raise BuildError(f"The scenario {scenario} is not there; name one with --scenario.")
     record = {"interpreter": sys.executable, "import_path": [str(_ROOT)]}
     return {
-        SCENARIO: scenario.read_bytes(),
+        SCENARIO: _whole(scenario),
         RECORD: json.dumps(record, indent=2).encode(),
         "requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
     }
+
+
+def _whole(scenario: Path) -> bytes:
+    """The scenario in one file: one that names a table beside it, which is not in the archive, with what is in that."""
+    content = scenario.read_bytes()
+    if b'_csv"' not in content:
+        return content
+    from warp_mpm.scenario import Scenario
+
+    return json.dumps(Scenario.load(scenario).resolved(), indent=2).encode()
 
 
 def _simulated_reference(folder: Path, resources: Mapping[str, bytes]) -> dict[str, bytes]:

@@ -90,7 +90,7 @@ def _pictures(results: Results, field: Drawn, width: int, frames: Iterable[int])
         frame = snapshots[index]
         panels[0].clear()
         drawn = draw_points(panels[0], frame, shown(results, frame, field), field, limits)
-        draw_surroundings(panels[0], results, frame, view)
+        draw_surroundings(panels[0], scenario, frame, view, results.barrier_displacements(frame))
         panels[0].set(xlabel="x [m]", ylabel="y [m]")
         panels[0].set_title(f"t = {frame.time:.2f} s", fontsize=10, loc="left")
         if bar is None:

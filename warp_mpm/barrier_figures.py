@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analytic.force_record import cumulative_impulse, filtered_peak, moving_mean
 from warp_mpm.results import Snapshots
-from warp_mpm.scenario import Scenario
+from warp_mpm.scenario import Scenario, Wall
 from warp_mpm.scenario.site import all_standing
 from warp_mpm.snapshot import Snapshot
 
@@ -101,11 +101,11 @@ def _volumes_beyond(
     snapshot = snapshots[-1]
     volume = snapshot["solid_mass"] / scenario.flow.material.solid_partial_density
     found = {"inside": float(volume.sum())}
-    for name, x, barrier, standing in all_standing(scenario):
+    for name, x, barrier in scenario.all_barriers:
         moved = snapshot.barrier_displacement or 0.0
         if name != "barrier":
             moved = float(series.get(f"{name}_barrier_displacement", np.zeros(1))[-1])
-        end = x if standing is None else x + barrier.shape.polygon[2, 0]
+        end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.polygon[2, 0]
         found[name] = float(volume @ (snapshot.position[:, 0] > end + moved))
     return found
 

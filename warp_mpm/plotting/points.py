@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,7 +94,7 @@ def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] | No
         for row, frame in enumerate(frames[column]):
             panel = axes[row, column]
             drawn = draw_points(panel, frame, values[column][row], field, (low, high))
-            draw_surroundings(panel, results, frame, view)
+            draw_surroundings(panel, results.scenario, frame, view, results.barrier_displacements(frame))
             greatest = f"{values[column][row].max(initial=0.0):.3g} {field.shown_unit.strip('-')}"
             caption = f"t = {frame.time:.2f} s, greatest {greatest.strip()}"
             if row == 0 and len(runs) > 1:
@@ -169,11 +169,22 @@ def draw_points(
     return discs
 
 
-def draw_surroundings(panel: Axes, results: Results, frame: Snapshot, limits: Window) -> None:
-    """Ground, barriers where they stand and, dotted, where they stood, and an inflow's section; the panel's limits."""
+def draw_surroundings(
+    panel: Axes, scenario: Scenario, frame: Snapshot, limits: Window, moved: Mapping[str, float] | None = None
+) -> None:
+    """Ground, barriers where they stand and, dotted, where they stood, and an inflow's section; the panel's limits.
+
+    Args:
+        panel: to draw on.
+        scenario: of the run.
+        frame: of which the first barrier's displacement is taken where `moved` is not given.
+        limits: of the panel.
+        moved: displacements of the barriers by name [m], from `Results.barrier_displacements`.
+    """
     left, right, bottom, high = limits
     panel.set(xlim=(left, right), ylim=(bottom, high), aspect="equal")
-    draw_ground(panel, results.scenario, left, right, bottom)
-    draw_barriers(panel, results.scenario, results.barrier_displacements(frame), right, high)
-    if results.scenario.flow.inflow is not None:
-        draw_section(panel, results.scenario.flow.inflow, linewidth=0.8, linestyle=":")
+    draw_ground(panel, scenario, left, right, bottom)
+    shown = {"barrier": frame.barrier_displacement or 0.0} if moved is None else moved
+    draw_barriers(panel, scenario, shown, right, high)
+    if scenario.flow.inflow is not None:
+        draw_section(panel, scenario.flow.inflow, linewidth=0.8, linestyle=":")

@@ -92,7 +92,7 @@ def scene(scenario: Scenario, *, domain: bool = False) -> Figure:
     elif isinstance(shape, Wall):
         panel.text(0.5 * right, 0.5 * high, "wall\nwithout end", ha="center", va="center", fontsize=9)
     for name, x, barrier, standing in all_standing(scenario):
-        if name != BARRIER_NAME and standing is not None:
+        if name != BARRIER_NAME and standing is not None and isinstance(barrier.shape, Trapezoid):
             top = standing[int(np.argmax(standing[:, 1]))]
             words = f"{name}: x = {x:g} m,\nH = {barrier.shape.base_crest_height[2]:.3g} m, {barrier.motion.kind}"
             panel.text(top[0], top[1] + 0.4 * step, words, fontsize=8, ha="center", va="bottom")

@@ -131,13 +131,13 @@ def _misplaced(scenario: Scenario, field: str, x: float, barrier: Barrier, outli
             f"{field}.shape lies below the ground: its crest is at y = {top[1]:g} and the ground there at "
             f"y = {float(ground.height(top[0])):g}; the crest must lie above"
         )
-    if isinstance(barrier.motion, Sliding):
-        low, high = ground.range(x, x + barrier.shape.base_crest_height[0]) if barrier.shape.kind != "wall" else (0, 0)
+    if isinstance(barrier.motion, Sliding) and not isinstance(barrier.shape, Wall):
+        end = x + barrier.shape.base_crest_height[0]
+        low, high = ground.range(x, end)
         if high - low > 1e-6:
             found.append(
-                f"{field}.motion of the kind sliding needs level ground under the barrier, from x = {x:g} to "
-                f"{x + barrier.shape.base_crest_height[0]:g}; it rises by {high - low:.3g} m there (a slope of one "
-                "angle is gravity.tilt_deg)"
+                f"{field}.motion of the kind sliding needs level ground under the barrier, from x = {x:g} to {end:g}; "
+                f"it rises by {high - low:.3g} m there (a slope of one angle is gravity.tilt_deg)"
             )
     return found
 

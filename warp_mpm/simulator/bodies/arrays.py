@@ -132,7 +132,7 @@ def body_arrays(
     if effects.profile:
         number = profiled(bodies)
         given["profiled"] = number
-        given["near"] = _pieces_by_column(bodies[number].outline.segments, grid) + given["first_piece"][number]
+        given["near"] = pieces_by_column(bodies[number].outline.segments, grid) + given["first_piece"][number]
     if effects.friction:
         given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
         given["rubs"] = np.array([body.rubs for body in bodies], dtype=np.int32)
@@ -222,7 +222,7 @@ def contact_arrays(
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 
-def _pieces_by_column(pieces: Segments, grid: GridLayout) -> NDArray[np.int32]:
+def pieces_by_column(pieces: Segments, grid: GridLayout) -> NDArray[np.int32]:
     """First and last but one of the pieces [columns, 2] within `NEAR` cells of each column of the grid."""
     left = grid.left + np.arange(grid.columns) * grid.spacing
     low, high = left - NEAR * grid.spacing, left + (NEAR + 1.0) * grid.spacing

@@ -124,8 +124,15 @@ class Segments:
         return distance, normal, piece
 
     def _some(self, which: NDArray[np.int64]) -> Segments:
-        numbers = (self.begin, self.along, self.low, self.high, self.normal, self.offset)
-        return Segments(*(values[which] for values in numbers), self.closed)
+        return Segments(
+            self.begin[which],
+            self.along[which],
+            self.low[which],
+            self.high[which],
+            self.normal[which],
+            self.offset[which],
+            self.closed,
+        )
 
     def _height_on(self, which: NDArray[np.int64], x: Array) -> Array:
         """y of some pieces' lines at `x`; of upright ones where they begin, whose other end is their neighbour's."""
