@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
-from warp_mpm.scenario.inflow import surges_of
 from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario.inflow import surges_of
 
 
 def described(scenario: Scenario) -> list[str]:
@@ -43,8 +43,9 @@ def _arriving(scenario: Scenario) -> list[str]:
         if late > 1e-9 * inflow.volume:
             words.append(f"of it {late:.4g} m³/m after the end of the run")
     if flow.deposits:
-        words.append(f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of "
-                     f"{flow.deposited_volume:.4g} m³/m")
+        words.append(
+            f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of {flow.deposited_volume:.4g} m³/m"
+        )
     return ["; ".join(words)] if words else []
 
 

@@ -188,10 +188,10 @@ def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> Arr
     until = np.interp(edges, way[moving], volume[moving])
     columns = np.diff(until)
     least = SMALLEST_POINT * side * width
-    for column in range(len(columns) - 1):
-        if columns[column] < least:
-            columns[column + 1] += columns[column]
-            columns[column] = 0.0
+    for place in range(len(columns) - 1):
+        if columns[place] < least:
+            columns[place + 1] += columns[place]
+            columns[place] = 0.0
     if len(columns) > 1 and columns[-1] < least:
         last = int(np.flatnonzero(columns[:-1]).max(initial=0))
         columns[last] += columns[-1]

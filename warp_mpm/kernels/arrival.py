@@ -94,7 +94,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
     def push(
         points: Points, p: wp.int32, x: V2, pace: wp.float64, parameters: Parameters, arrival: Arrival, dt: wp.float64
     ):
-        """Give to the flow what the nodes gave to a point that is held, but for gravity's share: action and reaction."""
+        """Give to the flow what the nodes gave to a point that is held, but for gravity's share."""
         half = wp.float64(0.5)
         g = dt * wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
         speed = pace * arrival.conveyed[wp.static(CONVEYED_SPEED_BEFORE)]

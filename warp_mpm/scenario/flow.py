@@ -15,7 +15,18 @@ from pydantic import Field, create_model, model_validator
 from warp_mpm import geometry
 from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import AsWhole, Coordinate, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.schema import (
+    AsWhole,
+    Coordinate,
+    Density,
+    Length,
+    Model,
+    NonNegative,
+    Point,
+    Positive,
+    Velocity,
+    set_fields,
+)
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6

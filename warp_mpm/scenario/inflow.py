@@ -271,15 +271,14 @@ def hydrograph(path: str, velocity: Any = None, width: Any = None) -> dict[str, 
                 value = math.nan
             if not math.isfinite(value):
                 raise ValueError(
-                    f"{shown}, line {number}: {word!r} in the column {rows[0][1][place].strip()} must be a finite number"
+                    f"{shown}, line {number}: {word!r} in the column {rows[0][1][place].strip()} must be a finite "
+                    "number"
                 )
             columns[what].append(value)
     return _table_of(shown, columns, velocity, width)
 
 
-def _table_of(
-    shown: str, columns: dict[str, list[float]], velocity: Any, width: Any
-) -> dict[str, tuple[float, ...]]:
+def _table_of(shown: str, columns: dict[str, list[float]], velocity: Any, width: Any) -> dict[str, tuple[float, ...]]:
     table = {what: tuple(values) for what, values in columns.items() if what != "discharge"}
     if "velocities_m_per_s" in table and velocity is not None:
         raise ValueError(f"{shown} has a column of the velocity; velocity_m_per_s = {velocity} must then be left out")
@@ -313,7 +312,9 @@ def _divided(discharge: list[float] | None, width: float, by: list[float]) -> tu
     """Discharge per metre of width over a depth, or a velocity; 0 where there is none."""
     if discharge is None:
         return None
-    return tuple(q / width / other if q != 0.0 and other != 0.0 else 0.0 for q, other in zip(discharge, by, strict=True))
+    return tuple(
+        q / width / other if q != 0.0 and other != 0.0 else 0.0 for q, other in zip(discharge, by, strict=True)
+    )
 
 
 def _plain(name: str) -> str:

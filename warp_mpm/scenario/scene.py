@@ -90,7 +90,9 @@ def _beside(data: Any, folder: Path) -> Any:
     """The content of a scenario file, with the files that it names looked for beside it."""
     flow = data.get("flow") if isinstance(data, dict) else None
     inflow = flow.get("inflow") if isinstance(flow, dict) else None
-    if not isinstance(inflow, dict) or not isinstance(inflow.get("hydrograph_csv"), str):
+    if not isinstance(flow, dict) or not isinstance(inflow, dict):
+        return data
+    if not isinstance(inflow.get("hydrograph_csv"), str):
         return data
     found = inflow | {"hydrograph_csv": str(folder / inflow["hydrograph_csv"])}
     return data | {"flow": flow | {"inflow": found}}
