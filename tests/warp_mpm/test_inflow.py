@@ -8,6 +8,7 @@ import pytest
 
 from warp_mpm.discretization import SMALLEST_POINT, arriving_points, material_points
 from warp_mpm.extent import domain_extent
+from warp_mpm.kernels.layout import HELD
 from warp_mpm.recording import Schedule
 from warp_mpm.run import run_in_memory
 from warp_mpm.scenario import Inflow, Scenario
@@ -123,7 +124,7 @@ def test_what_is_no_inflow_gets_one_sentence(change, sentence):
     ("changes", "sentence"),
     [
         ({"domain.left_m": -11.0}, "x_m = -10 has no room upstream: domain.left_m = -11 must be at most -12, 4 cells"),
-        ({"domain.top_m": 6.5, "flow.inflow.depths_m": [0, 7, 2, 0]}, "top_m = 6.5 cuts the scene; it must be at least 7"),
+        ({"domain.top_m": 6.5, "flow.inflow.depths_m": [0, 7, 2, 0]}, "top_m = 6.5 cuts the scene; .* at least 7"),
         ({"output.end_time_s": 0.5}, "times_s begins at 0.5, when the run has ended"),
         (
             {"flow.shape": {"kind": "front_and_tail", "depth_m": 1, "squares": 0, "distance_m": 8},
@@ -272,6 +273,10 @@ def test_what_waits_is_not_gone_over():
     simulation = Simulation(paper_block(-6.0))
     simulation.advance(0.1)
     assert simulation._counts["points"] < 0.3 * simulation.material_points
+    # What is held has no noise that a filter would take for such once it is let go.
+    held = simulation._point_arrays["inside"].numpy() == HELD
+    assert held.sum() > 20
+    assert not simulation._point_arrays["pressure_residual"].numpy()[held].any()
     simulation.advance(1.0)
     assert 0.4 * simulation.material_points < simulation._counts["points"] < 0.8 * simulation.material_points
 
