@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mpm import geometry
 from warp_mpm.scenario import Inflow, Scenario
 from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.simulator.laws import LAWS
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,8 @@ class MaterialPoints:
     start. Until then its position is the one that it would have had at way 0, were the flow to go on upstream."""
     pace: Array
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
+    material: NDArray[np.int32]
+    """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
 
     @property
     def there(self) -> int:
@@ -78,6 +81,8 @@ class _Part:
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
     velocity: tuple[float, float] = (0.0, 0.0)
+    material: int = 0
+    """Place among the flow's materials."""
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -247,11 +252,16 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         position, volume = fill_polygon(polygon, numerics.spacing_m, numerics.points_per_cell)
         below = geometry.depth_below_surface(polygon, position)
         parts.append(_Part(position, volume, below, ratio, lateral, flow.velocity_m_per_s))
+    others = 0
     for deposit in flow.deposits:
         polygon, own = deposit.shape.polygon, deposit.lateral_stress_coefficient
+        number = 0
+        if deposit.material:
+            others = number = others + 1
+            own = LAWS.named(flow.material.law).lateral_stress_ratio(flow.material_of(deposit)) if own is None else own
         position, volume = fill_polygon(polygon, numerics.spacing_m, numerics.points_per_cell)
         below = geometry.depth_below_surface(polygon, position)
-        parts.append(_Part(position, volume, below, None, lateral if own is None else own))
+        parts.append(_Part(position, volume, below, None, lateral if own is None else own, material=number))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
@@ -271,6 +281,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         velocity=np.concatenate([np.tile(np.array(part.velocity), (len(part.volume), 1)) for part in parts]),
         entry=entry,
         pace=pace,
+        material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
     )
 
 

@@ -57,6 +57,8 @@ class Effects:
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
     arriving: bool = False
     """Some of the flow arrives at a section during the run."""
+    materials: bool = False
+    """Some material points have a skeleton of their own, of the same law."""
 
     @property
     def liquid(self) -> bool:
@@ -117,6 +119,7 @@ class Effects:
                 "joined",
                 "passing",
                 "arriving",
+                "materials",
             )
             if getattr(self, name)
         ]
