@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mpm import geometry
 from warp_mpm.scenario import Inflow, Scenario
 from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.simulator.laws import LAWS
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,8 @@ class MaterialPoints:
     at the section."""
     pace: Array
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
+    material: NDArray[np.int32]
+    """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
 
     @property
     def there(self) -> int:
@@ -81,6 +84,8 @@ class _Part:
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
     velocity: tuple[float, float] = (0.0, 0.0)
+    material: int = 0
+    """Place among the flow's materials."""
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -191,10 +196,10 @@ def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> Arr
     until = np.interp(edges, way[moving], volume[moving])
     columns = np.diff(until)
     least = SMALLEST_POINT * side * width
-    for column in range(len(columns) - 1):
-        if columns[column] < least:
-            columns[column + 1] += columns[column]
-            columns[column] = 0.0
+    for place in range(len(columns) - 1):
+        if columns[place] < least:
+            columns[place + 1] += columns[place]
+            columns[place] = 0.0
     if len(columns) > 1 and columns[-1] < least:
         last = int(np.flatnonzero(columns[:-1]).max(initial=0))
         columns[last] += columns[-1]
@@ -270,9 +275,14 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     ratio, lateral = flow.initial_pore_pressure_ratio, flow.lateral_stress_ratio
     if flow.shape is not None:
         parts.append(_Part(*_filled(scenario, flow.shape.polygon), ratio, lateral, flow.velocity_m_per_s))
+    others = 0
     for deposit in flow.deposits:
-        own = deposit.lateral_stress_coefficient
-        parts.append(_Part(*_filled(scenario, deposit.shape.polygon), None, lateral if own is None else own))
+        own, number = deposit.lateral_stress_coefficient, 0
+        if deposit.material:
+            others = number = others + 1
+            own = LAWS.named(flow.material.law).lateral_stress_ratio(flow.material_of(deposit)) if own is None else own
+        filled = _filled(scenario, deposit.shape.polygon)
+        parts.append(_Part(*filled, None, lateral if own is None else own, material=number))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
@@ -293,6 +303,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         velocity=np.concatenate([np.tile(np.array(part.velocity), (len(part.volume), 1)) for part in parts]),
         entry=entry,
         pace=pace,
+        material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
     )
 
 

@@ -35,7 +35,7 @@ from .state import saved
 from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
-from .state.parameters import kernel_parameters
+from .state.parameters import kernel_parameters, material_parameters
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
@@ -257,7 +257,20 @@ class Simulation:
     def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
         bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
-        points = point_arrays(scenario, effects, types, initial, liquid_bulk_modulus=bulk_modulus, device=device)
+        materials = (
+            material_parameters(scenario, effects, types, self._parameters, limits=self._limits)
+            if effects.materials
+            else []
+        )
+        points = point_arrays(
+            scenario,
+            effects,
+            types,
+            initial,
+            liquid_bulk_modulus=bulk_modulus,
+            materials=materials,
+            device=device,
+        )
         self._points, self._point_arrays = points.structure, points.arrays
         grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
@@ -755,7 +768,7 @@ class Simulation:
         }
 
     def _state_arrays(self) -> dict[str, Any]:
-        arrays = {f"points.{name}": array for name, array in self._point_arrays.items()}
+        arrays = {f"points.{name}": array for name, array in self._point_arrays.items() if name != "materials"}
         # Corner sums and the rest of the grid are rebuilt every step; only the blocks in use are remembered.
         arrays |= {
             "clock": self._clock,

@@ -178,6 +178,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     mean_over = " and ".join(filter(None, (told(f"pressure_patch_{unit}", "g") for unit in "ms")))
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
+        (words("inflow_volume"), told("inflow_volume", ",.1f")),
         (words("peak_force_filtered"), told("peak_force_filtered", at="peak_force_filtered_time")),
         ("  over one record", told("peak_force", at="peak_force_time")),
         ("  acting at a height of", told("peak_force_height", ",.2f")),

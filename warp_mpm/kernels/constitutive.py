@@ -73,6 +73,7 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
+    MATERIALS = effects.materials
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
@@ -234,6 +235,8 @@ def make_constitutive(
         Points that have left pass through as well, as `leave` has made them: at rest, so that nothing changes.
         """
         p = wp.tid()
+        if MATERIALS:
+            parameters = points.materials[read(points.material, p)]
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
         divergence = gradient[0] + gradient[3]
@@ -337,6 +340,8 @@ def make_constitutive(
         def yielding(points: Points, parameters: Parameters, book: Book):
             """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
             p = wp.tid()
+            if MATERIALS:
+                parameters = points.materials[read(points.material, p)]
             gap = F(0.0)
             if OPENS:
                 gap = read(points.solid_gap, p)

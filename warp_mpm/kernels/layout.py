@@ -302,12 +302,15 @@ def layout(effects: Effects) -> SimpleNamespace:
             "fastest": wp.float64,  # greatest velocity of the table, at any height [m/s]
         }
         types.Arrival = _structure("Arrival", arrival)
+    types.Parameters = _structure("Parameters", parameters)
+    if effects.materials:
+        points["material"] = array(dtype=wp.int32)  # place in the next
+        points["materials"] = array(dtype=types.Parameters)
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)
-    types.Parameters = _structure("Parameters", parameters)
     types.Bodies = _structure("Bodies", bodies)
     types.Contact = _structure("Contact", contact)
     types.Book = _structure("Book", BOOK)
-    types.point_fields, types.grid_fields = points, grid
+    types.point_fields, types.grid_fields, types.parameter_fields = points, grid, parameters
     types.body_fields, types.contact_fields, types.arrival_fields = bodies, contact, arrival
     return types

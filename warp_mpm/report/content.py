@@ -124,10 +124,14 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     energy = NAMED["flow_kinetic_energy"]
     column("solid_mass", "start")
     column("liquid_mass", "start")
+    if "inflow_mass" in series:
+        column("inflow_mass")
     column("left_mass")
     figure("mass_error", ", relative")
     column("momentum_x", "start")
     column("momentum_x", "end")
+    if "inflow_momentum_x" in series:
+        column("inflow_momentum_x")
     figure("impulse", " on the impacted face")
     figure("momentum_error", ", relative")
     first, last = total(0), total(-1)
@@ -136,10 +140,12 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     column("barrier_work")
     column("base_friction_work", label="  of it taken by base friction")
     column("seepage_work")
+    if "inflow_energy" in series:
+        column("inflow_energy")
     column("left_energy")
     if first is not None and last is not None:
         spent = first - last - (at("barrier_work", -1) or 0.0) - (at("left_energy", -1) or 0.0)
-        spent += at("seepage_work", -1) or 0.0
+        spent += (at("seepage_work", -1) or 0.0) + (at("inflow_energy", -1) or 0.0)
         row("dissipated in the flow", spent, energy)
     figure("energy_error", ", relative")
     return rows

@@ -16,6 +16,7 @@ from warp_mpm import geometry
 from warp_mpm.scenario.ground import Ground
 from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
+from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.schema import (
     AsWhole,
     Coordinate,
@@ -134,12 +135,16 @@ class FlowOnGround(Model):
 
 
 class Deposit(Model):
-    """What lies there at the start, of the flow's material: the deposit of an earlier surge."""
+    """What lies there at the start: the deposit of an earlier surge."""
 
     shape: Annotated[FlowPolygon | FlowOnGround, Field(discriminator="kind")]
     """Its outline."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow."""
+    """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow, or of the law
+    where it has a `material`."""
+    material: dict[str, float] | None = None
+    """What its skeleton has otherwise than flow.material: young_modulus_Pa, poisson_ratio and fields of the law; null:
+    nothing."""
 
     def laid_on(self, ground: Ground) -> Self:
         """The same deposit as a polygon over `ground`, where it is of the kind on_ground."""
@@ -276,7 +281,7 @@ class _FlowBase(Model):
     inflow: Inflow | None = None
     """What arrives at a section during the run; null: nothing does."""
     deposits: Annotated[tuple[Deposit, ...], Field(strict=False, max_length=100)] = ()
-    """What lies there at the start and does not move, of the same material."""
+    """What lies still at the start."""
     initial_stress: Literal["geostatic", "zero"] = "geostatic"
     """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
@@ -324,6 +329,31 @@ class _FlowBase(Model):
         """Field and outline [V, 2] [m] of everything that is there at t = 0."""
         found = [("flow.shape", self.shape.polygon)] if self.shape is not None else []
         return found + [(f"flow.deposits[{k}]", deposit.shape.polygon) for k, deposit in enumerate(self.deposits)]
+
+    @model_validator(mode="after")
+    def _other_materials(self) -> Self:
+        known = ("young_modulus_Pa", "poisson_ratio", *LAWS.named(self.material.law).Settings.model_fields)
+        for place, deposit in enumerate(self.deposits):
+            name = f"deposits[{place}].material"
+            for field in deposit.material or {}:
+                if field not in known:
+                    raise ValueError(f"{name}.{field} is not allowed; a deposit may differ in {', '.join(known)}")
+            try:
+                self.material_of(deposit)
+            except ScenarioError as error:
+                raise ValueError(f"{name}: {error.problems[0].rstrip('.')}") from None
+        return self
+
+    def material_of(self, deposit: Deposit) -> Skeleton:
+        """The material of a deposit: the flow's, but for what its own says."""
+        if not deposit.material:
+            return self.material
+        return type(self.material).model_validate(self.material.model_dump() | deposit.material)
+
+    @property
+    def materials(self) -> list[Skeleton]:
+        """All of the scene's, the flow's first, then those that are its deposits' own."""
+        return [self.material, *(self.material_of(deposit) for deposit in self.deposits if deposit.material)]
 
     @property
     def polygon(self) -> geometry.Polygon:

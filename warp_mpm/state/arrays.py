@@ -50,6 +50,7 @@ def point_arrays(
     initial: MaterialPoints,
     *,
     liquid_bulk_modulus: float,
+    materials: Sequence[Any] = (),
     device: Any,
 ) -> Group:
     """State of the material points at the start; fields that nothing is said of begin at 0."""
@@ -64,6 +65,8 @@ def point_arrays(
     }
     if effects.arriving:
         given["pace"] = initial.pace
+    if effects.materials:
+        given |= {"material": initial.material, "materials": materials}
     if effects.liquid:
         given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
     for owner in (effects.skeleton, effects.scheme):
