@@ -15,6 +15,7 @@ from pydantic import Field, create_model, model_validator
 from warp_mpm import geometry
 from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
+from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.schema import (
     AsWhole,
     Coordinate,
@@ -27,7 +28,6 @@ from warp_mpm.schema import (
     Velocity,
     set_fields,
 )
-from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
