@@ -175,13 +175,23 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     if motion.kind == "prescribed":
         raise SceneError(f"{name}: barrier.motion.kind is {motion.kind!r}, the closed form knows fixed and sliding.")
     velocity_x, velocity_y = flow.velocity_m_per_s
+    remarks = []
+    if flow.inflow is not None:
+        velocity_x = max(velocity_x, flow.inflow.greatest_speed)
+        remarks.append("Of a flow that arrives the greatest depth and velocity are taken, and all of its volume.")
+    if flow.deposits:
+        remarks.append("The deposits are left out.")
     if velocity_x <= 0:
         raise SceneError(f"{name}: flow.velocity_m_per_s[0] is {velocity_x:g}, the flow must move towards the barrier.")
-    remarks = slips(scenario)
+    remarks += slips(scenario)
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
     if scenario.ground is not None and scenario.ground.friction != 0:
         remarks.append("The friction between flow and ground is left out.")
+    if scenario.ground is not None and scenario.ground.profile_m is not None:
+        remarks.append("The ground's profile is left out: the closed form knows one slope, gravity.tilt_deg.")
+    if scenario.barriers:
+        remarks.append("Further barriers are left out.")
     return Scene(
         title=scenario.title,
         flow_mass=flow.volume * flow.material.density,
@@ -193,8 +203,8 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         gravity=scenario.gravity.acceleration_m_per_s2,
         slope=scenario.gravity.tilt_deg,
         porosity=flow.material.porosity,
-        face_angle=shape.built_face_angle_deg if shape.kind == "trapezoid" else 90.0,
-        barrier_height=shape.base_crest_height[2] if shape.kind == "trapezoid" else math.inf,
+        face_angle=shape.built_face_angle_deg if shape.kind != "wall" else 90.0,
+        barrier_height=shape.base_crest_height[2] if shape.kind != "wall" else math.inf,
         barrier_density=barrier.density,
         distance=-float(flow.polygon[:, 0].max()),
         remarks=tuple(remarks),

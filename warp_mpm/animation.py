@@ -90,7 +90,7 @@ def _pictures(results: Results, field: Drawn, width: int, frames: Iterable[int])
         frame = snapshots[index]
         panels[0].clear()
         drawn = draw_points(panels[0], frame, shown(results, frame, field), field, limits)
-        draw_surroundings(panels[0], scenario, frame, view)
+        draw_surroundings(panels[0], scenario, frame, view, results.barrier_displacements(frame))
         panels[0].set(xlabel="x [m]", ylabel="y [m]")
         panels[0].set_title(f"t = {frame.time:.2f} s", fontsize=10, loc="left")
         if bar is None:
@@ -108,7 +108,12 @@ def _film_window(whole: Window, frames: Sequence[Any]) -> Window:
     _, right, bottom, _ = whole
     far, high = np.quantile(points[:, 0], 0.99), np.quantile(points[:, 1], 0.995)
     barrier = max((frame.barrier_displacement or 0.0) for frame in frames) + 15.0
-    return whole[0], min(right, max(float(far), barrier)), bottom, max(1.1 * float(high), bottom + 4.0)
+    return (
+        whole[0],
+        min(right, max(float(far), barrier)),
+        bottom,
+        max(float(high) + 0.1 * abs(float(high)), bottom + 4.0),
+    )
 
 
 def _draw_curves(panel: Any, results: Results) -> list[Any]:

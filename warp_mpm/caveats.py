@@ -43,11 +43,12 @@ def scene_caveats(scenario: Scenario) -> list[str]:
     found += slips(scenario)
     found += LAWS.named(flow.material.law).caveats(flow.material)
     found += [*_unlikely_friction(scenario), *_impossible_start(scenario)]
-    if scenario.barrier is not None and not _can_arrive(scenario):
+    uneven = scenario.ground is not None and scenario.ground.profile_m is not None
+    if scenario.barrier is not None and not uneven and not _can_arrive(scenario):
         driven = isinstance(scenario.barrier.motion, Prescribed)
         found.append(
             f"The flow does not get to the barrier by t = {scenario.output.end_time_s:g} s; look at "
-            "flow.velocity_m_per_s, the flow's distance, "
+            + ("flow.inflow, " if flow.inflow is not None else "flow.velocity_m_per_s, the flow's distance, ")
             + ("barrier.motion.velocities_m_per_s, " if driven else "")
             + "gravity.tilt_deg and output.end_time_s."
         )
@@ -57,6 +58,12 @@ def scene_caveats(scenario: Scenario) -> list[str]:
 def _unlikely_friction(scenario: Scenario) -> list[str]:
     """Surfaces that are rougher than any."""
     given: dict[str, float | None] = {"ground.friction": scenario.ground.friction if scenario.ground else None}
+    for number, stretch in enumerate(scenario.ground.stretches if scenario.ground else ()):
+        given[f"ground.stretches[{number}].friction"] = stretch.friction
+    for number, further in enumerate(scenario.barriers):
+        given |= {
+            f"barriers[{number}].friction.{name}": getattr(further.friction, name) for name in ("face", "top", "back")
+        }
     if scenario.barrier is not None:
         rubbing = scenario.barrier.friction
         given |= {f"barrier.friction.{name}": getattr(rubbing, name) for name in ("face", "top", "back")}
@@ -122,15 +129,19 @@ def _can_arrive(scenario: Scenario) -> bool:
     acceleration, _ = scenario.gravity.vector
     x, y = flow.polygon.T
     along, across = flow.velocity_m_per_s
+    begin = 0.0
+    if flow.inflow is not None:
+        along = max(along, flow.inflow.greatest_speed)
+        begin = flow.inflow.times[0] if flow.shape is None else 0.0
     speed = along + abs(across) + 2.0 * math.sqrt(scenario.gravity.acceleration_m_per_s2 * float(np.ptp([0.0, *y])))
     # Where gravity holds it back, a front is farthest before the end.
     farthest = speed / -acceleration if speed > 0.0 > acceleration else math.inf
     time = np.linspace(0.0, end, 401)
-    going = np.minimum(time, farthest)
+    going = np.clip(time - begin, 0.0, farthest)
     front = float(x.max()) + speed * going + 0.5 * acceleration * going**2
     # From there it goes back, unless the ground holds it.
     held = scenario.ground.friction * -scenario.gravity.vector[1] if scenario.ground is not None else 0.0
-    front += 0.5 * min(acceleration + held, 0.0) * np.maximum(time - farthest, 0.0) ** 2
+    front += 0.5 * min(acceleration + held, 0.0) * np.maximum(time - begin - farthest, 0.0) ** 2
     face = np.zeros(len(time))  # where it starts
     motion = scenario.barrier.motion if scenario.barrier is not None else None
     if isinstance(motion, Prescribed):

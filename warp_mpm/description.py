@@ -5,22 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
-from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario.inflow import surges_of
 
 
 def described(scenario: Scenario) -> list[str]:
-    """A scene in two lines: flow and ground; barrier and run."""
+    """A scene in two lines: flow and ground; barrier and run. Between them, where there is such, one on what arrives
+    and what lies there."""
     flow, numerics, ground, tilt = scenario.flow, scenario.numerics, scenario.ground, scenario.gravity.tilt_deg
     speed = f"v = {flow.speed:.4g} m/s"
     if scenario.gravity.acceleration_m_per_s2 > 0.0:
         speed += f" (Fr {flow.speed / (scenario.gravity.acceleration_m_per_s2 * flow.depth) ** 0.5:.2f})"
-    slope = "no ground" if ground is None else f"slope {tilt:g}°, ground friction {ground.friction:g}"
+    slope = "no ground" if ground is None else f"slope {tilt:g}°, {_ground(ground)}"
     material = flow.formulation.replace("_", "-")
-    points = flow.volume / numerics.spacing_m**2 * numerics.points_per_cell
+    points = (flow.volume + flow.deposited_volume) / numerics.spacing_m**2 * numerics.points_per_cell
     return [
         f"{material} flow of {flow.volume:g} m³/m, {flow.volume * flow.material.density:,.0f} kg/m, "
         f"{flow.depth:g} m deep, {speed}; {slope}",
-        f"{_barrier(scenario.barrier)}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
+        *_arriving(scenario),
+        f"{'; '.join(_barriers(scenario))}; ends at {scenario.output.end_time_s:g} s; about {points:,.0f} points on a "
         f"{numerics.spacing_m:g} m grid, {numerics.precision}",
     ]
 
@@ -65,6 +68,27 @@ def numbers(scenario: Scenario) -> dict[str, float | str | None]:
     }
 
 
+def _arriving(scenario: Scenario) -> list[str]:
+    """What arrives and what lies there, in a line; none where neither does."""
+    flow, words = scenario.flow, []
+    if flow.inflow is not None:
+        inflow = flow.inflow
+        surges = len(surges_of(inflow))
+        words.append(
+            f"{inflow.volume:.4g} m³/m arrive at x = {inflow.x_m:g} m from t = {inflow.times[0]:g} to "
+            f"{inflow.times[-1]:g} s, in {surges} surge{'' if surges == 1 else 's'}, up to "
+            f"{inflow.greatest_depth:.3g} m deep and {inflow.greatest_speed:.3g} m/s fast"
+        )
+        late = inflow.volume - inflow.volume_until(scenario.output.end_time_s)
+        if late > 1e-9 * inflow.volume:
+            words.append(f"of it {late:.4g} m³/m after the end of the run")
+    if flow.deposits:
+        words.append(
+            f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of {flow.deposited_volume:.4g} m³/m"
+        )
+    return ["; ".join(words)] if words else []
+
+
 def described_material(scenario: Scenario) -> str:
     """The flow's material in one line, as a geotechnical engineer asks for it, with its length."""
     flow = scenario.flow
@@ -85,11 +109,33 @@ def described_domain(scenario: Scenario) -> str:
     extent, domain = domain_extent(scenario), scenario.domain
     edges = extent.edges
     bottom = "" if scenario.ground is not None else f"y = {edges.bottom:.4g} m, "
-    rides = ", riding with the barrier" if scenario.barrier is not None and barrier_travel(scenario) != Travel() else ""
+    moves = scenario.plain and scenario.barrier is not None and barrier_travel(scenario) != Travel()
+    rides = ", riding with the barrier" if moves else ""
     words = f"domain from x = {edges.left:.4g} to {edges.right:.4g} m, {bottom}up to y = {edges.top:.4g} m{rides}"
     if None in (domain.left_m, domain.right_m, domain.top_m):
         words += f"; fitted to speeds up to {extent.speed:.3g} m/s"
+    ground = scenario.ground
+    if ground is not None and ground.profile_m is not None:
+        first, last = ground.ends
+        ends = [f"x = {x:.4g} m" for x, edge in ((first, edges.left), (last, edges.right)) if x == edge]
+        words += f", and no further than the ground's profile, {' and '.join(ends)}" if ends else ""
     return words
+
+
+def _ground(ground: Ground) -> str:
+    frictions = ", ".join(f"{friction:g}" for _, friction in ground.frictions)
+    if ground.profile_m is None:
+        return f"ground friction {frictions}"
+    low, high = ground.profile[:, 1].min(), ground.profile[:, 1].max()
+    return (
+        f"ground of {len(ground.profile)} points from x = {ground.ends[0]:.4g} to {ground.ends[1]:.4g} m, "
+        f"y = {low:.4g} to {high:.4g} m, friction {frictions}"
+    )
+
+
+def _barriers(scenario: Scenario) -> list[str]:
+    found = [] if scenario.barrier is None and scenario.barriers else [_barrier(scenario.barrier)]
+    return found + [f"{one.name} at x = {one.x_m:g} m: {_barrier(one)}" for one in scenario.barriers]
 
 
 def _barrier(barrier: Barrier | None) -> str:

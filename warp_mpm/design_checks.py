@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from analytic.empirical import reflected_depth_ratio
 from analytic.force_record import RESIDUAL_SHARE, moving_mean
 from warp_mpm import geometry
+from warp_mpm.arrival_figures import departed_volume
 from warp_mpm.quantities import Quantity
-from warp_mpm.scenario import Design, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario import Design, OutlineShape, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario.site import standing_outline
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
@@ -199,6 +201,8 @@ class _Block:
     """[N/m]"""
     base: float
     """[m]"""
+    arm: float
+    """Way from its heel upstream to its centre of gravity [m]."""
     middle: float
     """Height of its centre of gravity [m]."""
     friction: float | None
@@ -211,14 +215,21 @@ def _block(scenario: Scenario, design: Design) -> _Block | str:
     assert barrier is not None
     assert isinstance(barrier.shape, Trapezoid)
     friction, density = design.base_friction, design.density_kg_per_m3
-    mass = None if density is None else density * geometry.area(barrier.shape.polygon)
+    mass = None if density is None else density * geometry.area(barrier.shape.outline)
     if isinstance(barrier.motion, Sliding):
         mass, friction = barrier.mass, barrier.motion.base_friction_coefficient
     if mass is None:
         return "The barrier has no weight: design.density_kg_per_m3 is needed for its stability."
+    standing = standing_outline(barrier, 0.0, scenario.ground)
+    assert standing is not None
+    if abs(standing[-1, 1]) > 1e-6 * float(np.ptp(standing)):
+        return "The barrier's base is not level: its stability is not judged."
     base, crest, height = barrier.shape.base_crest_height
-    middle = height / 3.0 * (base + 2.0 * crest) / (base + crest)
-    return _Block(mass * scenario.gravity.acceleration_m_per_s2, base, middle, friction)
+    arm, middle = 0.5 * base, height / 3.0 * (base + 2.0 * crest) / (base + crest)
+    if isinstance(barrier.shape, OutlineShape):
+        centre, middle = (float(way) for way in geometry.centroid(barrier.shape.outline))
+        arm = base - centre
+    return _Block(mass * scenario.gravity.acceleration_m_per_s2, base, arm, middle, friction)
 
 
 def _stability(
@@ -253,10 +264,10 @@ def _stability(
     else:
         resistance = block.friction / design.base_friction_factor * np.maximum(normal, 0.0)
         found["sliding_factor"] = _least(time, resistance, across)
-    found["overturning_factor"] = _least(time, np.full(len(time), down * 0.5 * block.base), overturning)
+    found["overturning_factor"] = _least(time, np.full(len(time), down * block.arm), overturning)
     # Where the reaction of the base acts, from its heel; the base cannot pull.
     with np.errstate(divide="ignore", invalid="ignore"):
-        from_heel = np.where(normal > 0.0, (down * 0.5 * block.base - overturning) / normal, -math.inf)
+        from_heel = np.where(normal > 0.0, (down * block.arm - overturning) / normal, -math.inf)
         share = np.abs(0.5 - from_heel / block.base)
         edge = (0.5 - share) * block.base
         pressure = np.where(share <= 1.0 / 6.0, normal / block.base * (1.0 + 6.0 * share), 2.0 * normal / (3.0 * edge))
@@ -334,7 +345,7 @@ def _overtopping(scenario: Scenario, figures: Mapping[str, Any]) -> dict[str, tu
     if not isinstance(scenario.barrier.shape, Trapezoid):
         # Nothing gets over a wall without end; what left the domain did so elsewhere.
         return {"overtopped_share": (0.0, None), "overtopped_volume": (0.0, None), "freeboard": (None, None)}
-    beyond, left = figures.get("overtopped_volume"), figures.get("left_volume")
+    beyond, left = figures.get("overtopped_volume"), departed_volume(scenario, figures)
     if beyond is not None:
         volume = float(beyond) + max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
         found["overtopped_share"] = (volume / scenario.flow.volume, None)

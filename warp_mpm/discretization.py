@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm import geometry
-from warp_mpm.scenario import Scenario
+from warp_mpm.scenario import Inflow, Scenario
+from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.simulator.laws import LAWS
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,57 @@ class MaterialPoints:
     """[N, 4] xx, yy, zz, xy."""
     pore_pressure: Array
     """[N]; zeros for a dry flow."""
+    velocity: Array
+    """[N, 2] m/s, of both phases; zeros of what has yet to arrive."""
+    entry: Array
+    """[N] way of the inflow [m] at which a point comes into the approach, increasing; -inf of what is there at the
+    start. Until then its x is the one that it would have had at way 0, were the flow to go on upstream, and its y that
+    at the section."""
+    pace: Array
+    """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
+    material: NDArray[np.int32]
+    """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
+
+    @property
+    def there(self) -> int:
+        """How many are there at the start; the others arrive."""
+        return int(np.searchsorted(self.entry, -math.inf, side="right"))
+
+    @property
+    def waits(self) -> NDArray[np.bool_]:
+        """[N] whether a point has yet to arrive."""
+        return self.entry > -math.inf
+
+
+@dataclass(frozen=True)
+class ArrivingPoints:
+    """N points that arrive, as `MaterialPoints` has them."""
+
+    position: Array
+    volume: Array
+    below: Array
+    """[N] m below the surface."""
+    entry: Array
+    pace: Array
+    pore_pressure_ratio: Array | None
+    """[N] λ_p; None: that of the flow."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """N points of one body of the scene."""
+
+    position: Array
+    volume: Array
+    below: Array
+    """[N] m below its surface."""
+    slope: Array
+    """[N] dy/dx of the long slope whose stress it has."""
+    pore_pressure_ratio: float | Array | None
+    lateral_stress_ratio: float
+    velocity: tuple[float, float] = (0.0, 0.0)
+    material: int = 0
+    """Place among the flow's materials."""
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -119,34 +172,164 @@ def _join_slivers(
                 break
 
 
+def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> ArrivingPoints:
+    """Material points of all that arrives, in the order in which they come into the approach.
+
+    Drawn as it passes the section, the flow is cut into columns as wide as a point, and these into rows from its
+    underside on; the top row of a column gets what is left, joined to the row below where that is less than
+    `SMALLEST_POINT` of a whole point. What is too low for a point of its own is added to the next column. The volume is
+    therefore that of the table, to rounding.
+
+    With a velocity that varies over the depth, a point of pace f stands for f of its column's volume, and points of a
+    row lie f times as far apart as it passes: columns are narrower by the greatest pace, so that no row is thin.
+
+    Args:
+        inflow: what arrives.
+        spacing: side of a grid cell [m].
+        points_per_cell: a square number.
+    """
+    side = spacing / math.isqrt(points_per_cell)
+    way, volume, _ = inflow.profile
+    width = side / float(inflow.paces(np.array([0.0, 1.0])).max())
+    edges = np.arange(0.0, way[-1] + width, width)
+    moving = np.concatenate([[True], np.diff(way) > 0.0])  # where the flow stands still, nothing passes
+    until = np.interp(edges, way[moving], volume[moving])
+    columns = np.diff(until)
+    least = SMALLEST_POINT * side * width
+    for place in range(len(columns) - 1):
+        if columns[place] < least:
+            columns[place + 1] += columns[place]
+            columns[place] = 0.0
+    if len(columns) > 1 and columns[-1] < least:
+        last = int(np.flatnonzero(columns[:-1]).max(initial=0))
+        columns[last] += columns[-1]
+        columns[-1] = 0.0
+    height, middle, bottom, top = [], [], [], []
+    for column in np.flatnonzero(columns):
+        depth = columns[column] / width
+        rows = max(math.floor(depth / side + 1.0 - SMALLEST_POINT), 1)
+        low = side * np.arange(rows)
+        high = np.append(low[1:], depth)
+        middle.append(np.full(rows, edges[column] + 0.5 * width))
+        height.append(np.full(rows, depth))
+        bottom.append(low)
+        top.append(high)
+    low, high, depth, ways = (np.concatenate(part) for part in (bottom, top, height, middle))
+    pace = inflow.paces(0.5 * (low + high) / depth)
+    volumes = (high - low) * width * pace
+    volumes *= inflow.volume / volumes.sum()
+    start = inflow.x_m - pace * ways
+    entry = ways - APPROACH * spacing / pace
+    order = np.argsort(entry, kind="stable")
+    ratio = None
+    if inflow.pore_pressure_ratios is not None:
+        given = np.interp(_time_of(inflow, ways), inflow.times, inflow.pore_pressure_ratios)
+        ratio = given[order]
+    position = np.stack([start, inflow.base + 0.5 * (low + high)], axis=1)
+    below = depth - 0.5 * (low + high)
+    return ArrivingPoints(position[order], volumes[order], below[order], entry[order], pace[order], ratio)
+
+
+def _time_of(inflow: Inflow, way: Array) -> Array:
+    """Times [N] at which the flow has gone a way [N] [m]."""
+    shares = np.linspace(0.0, 1.0, 33)[:-1]
+    times = np.append((inflow.times[:-1, None] + np.diff(inflow.times)[:, None] * shares).ravel(), inflow.times[-1])
+    ways = np.array([inflow.way(time) for time in times])
+    moving = np.concatenate([[True], np.diff(ways) > 0.0])
+    return np.interp(way, ways[moving], times[moving])
+
+
+def _along_slope(slope: Array, stress: Array) -> tuple[Array, Array]:
+    """cos² alpha [N] of slopes dy/dx [N], and the stress [N, 4] of a level layer, as that of one along the slope."""
+    square = 1.0 / (1.0 + slope**2)
+    lateral, vertical = square * stress[:, 0], square * stress[:, 1]
+    xx = square * (lateral + slope**2 * vertical)
+    yy = square * (vertical + slope**2 * lateral)
+    xy = square * slope * (lateral - vertical)
+    return square, np.stack([xx, yy, square * stress[:, 2], xy], axis=1)
+
+
+def _shared_slope(scenario: Scenario, outline: geometry.Polygon, position: Array) -> Array:
+    """Slope dy/dx [N] that a body's surface and the ground share at each of its points: the lesser of the two where
+    both fall to one side."""
+    if scenario.ground is None or scenario.ground.level:
+        return np.zeros(len(position))
+    surface, ground = geometry.surface_slope(outline, position), scenario.ground.slope(position[:, 0])
+    return np.where(surface * ground > 0.0, np.sign(ground) * np.minimum(np.abs(surface), np.abs(ground)), 0.0)
+
+
 def material_points(scenario: Scenario) -> MaterialPoints:
-    """The scenario's flow as material points, with masses and initial stress.
+    """The scenario's flow as material points, with masses and initial stress: what is there at the start, what lies
+    there, and what arrives, in this order.
 
     Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
     share of the weight; the vertical effective stress carries the rest, and the horizontal ones are K0 times it.
     Gravity's component along the ground is left out of the initial stress.
+
+    Over a profile the stress is that of a long slope of the angle alpha that surface and ground share, the lesser of
+    the two where both fall to one side: normal to the slope, cos² alpha of what lies above, and K0 along it. Under a
+    level surface it is the whole, whatever the ground: a pond is at rest. What arrives has the slope of the ground.
     """
     flow, numerics = scenario.flow, scenario.numerics
-    material = flow.material
-    position, volume = fill_polygon(flow.polygon, numerics.spacing_m, numerics.points_per_cell)
-    pore_pressure = np.zeros(len(volume))
-    effective_stress = np.zeros((len(volume), 4))
+    parts: list[_Part] = []
+    ratio, lateral = flow.initial_pore_pressure_ratio, flow.lateral_stress_ratio
+    if flow.shape is not None:
+        parts.append(_Part(*_filled(scenario, flow.shape.polygon), ratio, lateral, flow.velocity_m_per_s))
+    others = 0
+    for deposit in flow.deposits:
+        own, number = deposit.lateral_stress_coefficient, 0
+        if deposit.material:
+            others = number = others + 1
+            own = LAWS.named(flow.material.law).lateral_stress_ratio(flow.material_of(deposit)) if own is None else own
+        filled = _filled(scenario, deposit.shape.polygon)
+        parts.append(_Part(*filled, None, lateral if own is None else own, material=number))
+    there = sum(len(part.volume) for part in parts)
+    entry, pace = np.full(there, -math.inf), np.zeros(there)
+    if flow.inflow is not None:
+        coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
+        own_ratio = ratio if coming.pore_pressure_ratio is None else coming.pore_pressure_ratio
+        slope = np.full(len(coming.volume), flow.inflow.slope)
+        parts.append(_Part(coming.position, coming.volume, coming.below, slope, own_ratio, lateral))
+        entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
+    stresses = [_initial_stress(scenario, part) for part in parts]
+    volume = np.concatenate([part.volume for part in parts])
+    return MaterialPoints(
+        position=np.concatenate([part.position for part in parts]),
+        volume=volume,
+        solid_mass=flow.material.solid_partial_density * volume,
+        liquid_mass=flow.material.liquid_partial_density * volume,
+        effective_stress=np.concatenate([effective for effective, _ in stresses]),
+        pore_pressure=np.concatenate([pore for _, pore in stresses]),
+        velocity=np.concatenate([np.tile(np.array(part.velocity), (len(part.volume), 1)) for part in parts]),
+        entry=entry,
+        pace=pace,
+        material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
+    )
+
+
+def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array, Array, Array]:
+    """Position, volume, depth below the surface and shared slope of the points of a body that is there at the start."""
+    position, volume = fill_polygon(outline, scenario.numerics.spacing_m, scenario.numerics.points_per_cell)
+    below = geometry.depth_below_surface(outline, position)
+    return position, volume, below, _shared_slope(scenario, outline, position)
+
+
+def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
+    """Effective stress [N, 4] and pore pressure [N] of a part of the scene."""
+    flow, material = scenario.flow, scenario.flow.material
+    pore_pressure = np.zeros(len(part.volume))
+    effective_stress = np.zeros((len(part.volume), 4))
     if flow.initial_stress == "geostatic":
-        depth = geometry.depth_below_surface(flow.polygon, position)
+        depth, share = part.below, part.pore_pressure_ratio
         downward = -scenario.gravity.vector[1]
         liquid_density = getattr(material, "liquid_density_kg_per_m3", 0.0)
         # What the liquid bears of the weight above, as a density: hydrostatic, or the given share of it.
-        share = flow.initial_pore_pressure_ratio
         borne = liquid_density if share is None else share * material.density
         pore_pressure = borne * downward * depth
         vertical = -(material.density - borne) * downward * depth
-        lateral = flow.lateral_stress_ratio * vertical
+        lateral = part.lateral_stress_ratio * vertical
         effective_stress[:, 0], effective_stress[:, 1], effective_stress[:, 2] = lateral, vertical, lateral
-    return MaterialPoints(
-        position=position,
-        volume=volume,
-        solid_mass=material.solid_partial_density * volume,
-        liquid_mass=material.liquid_partial_density * volume,
-        effective_stress=effective_stress,
-        pore_pressure=pore_pressure,
-    )
+        if part.slope.any():
+            square, effective_stress = _along_slope(part.slope, effective_stress)
+            pore_pressure = square * pore_pressure
+    return effective_stress, pore_pressure

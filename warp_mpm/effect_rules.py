@@ -8,6 +8,8 @@ from typing import Any
 
 from .effects import Effects
 from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .simulator.bodies.of_scene import ground_body
+from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
 from .simulator.schemes import SCHEMES
 
@@ -72,6 +74,18 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
             {"flow.material.porosity_update": not porosity} if two_phase else {},
         ),
+        Rule(
+            "arriving",
+            flow.inflow is not None,
+            "all of the flow is there at the start"
+            if flow.inflow is None
+            else f"flow.inflow brings {flow.inflow.volume:.4g} m³/m",
+        ),
+        Rule(
+            "materials",
+            len(flow.materials) > 1,
+            "a deposit has a material of its own" if len(flow.materials) > 1 else "all have the flow's material",
+        ),
     ]
 
 
@@ -123,38 +137,55 @@ def _numerical_rules(scenario: Scenario) -> list[Rule]:
 
 
 def _body_rules(scenario: Scenario) -> list[Rule]:
-    barrier, ground, domain = scenario.barrier, scenario.ground, scenario.domain
-    kind = "none" if barrier is None else barrier.motion.kind
-    why_moves = "there is no barrier" if barrier is None else f"barrier.motion.kind = {kind}"
-    fixed = {"barrier.motion": {"kind": "fixed"}}
+    ground, domain = scenario.ground, scenario.domain
+    barriers = {"barrier": scenario.barrier} if scenario.barrier is not None else {}
+    barriers |= {f"barriers[{number}]": one for number, one in enumerate(scenario.barriers)}
+    kinds = {name: barrier.motion.kind for name, barrier in barriers.items()}
     edges = [
         f"domain.{name} = wall" for name in ("left_edge", "right_edge", "top_edge") if getattr(domain, name) == "wall"
     ]
-    solid = [name for name, there in (("ground", ground), ("barrier", barrier)) if there is not None] + edges
+    solid = [*(["ground"] if ground is not None else []), *barriers, *edges]
     frictions, rough, smooth = [], {}, {}
-    if barrier is not None:
+    for name, barrier in barriers.items():
         greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
-        frictions.append((greatest, f"the greatest of barrier.friction is {greatest:g}"))
+        frictions.append((greatest, f"the greatest of {name}.friction is {greatest:g}"))
+    if scenario.barrier is not None:
         rough["barrier.friction"], smooth["barrier.friction"] = 0.3, 0.0
     if ground is not None:
         frictions.append((ground.friction, f"ground.friction = {ground.friction:g}"))
+        if ground.stretches:
+            roughest = max(stretch.friction for stretch in ground.stretches)
+            frictions.append((roughest, f"the greatest of ground.stretches is {roughest:g}"))
         rough["ground.friction"], smooth["ground.friction"] = 0.3, 0.0
     rubs = any(friction > 0.0 for friction, _ in frictions)
-    passing = kind in ("sliding", "prescribed") and any("top" not in edge for edge in edges)
+    moves = any(kind in ("sliding", "prescribed") for kind in kinds.values())
+    past = moves and any("top" not in edge for edge in edges)
+    profile = ground is not None and not ground.level
+    joined = bool(barriers) or bool(edges) or profile
+
+    def why_moves(kind: str) -> tuple[bool, str, dict[str, Any]]:
+        """Whether a barrier moves so, the reason, and what switches it off."""
+        own = [name for name, one in kinds.items() if one == kind]
+        told = own or list(kinds)[:1]
+        reason = ", ".join(f"{name}.motion.kind = {kinds[name]}" for name in told) or "there is no barrier"
+        return bool(own), reason, {"barrier.motion": {"kind": "fixed"}} if own == ["barrier"] else {}
+
     return [
         Rule("bodies", bool(solid), ", ".join(solid) if solid else "nothing solid is there"),
         Rule(
             "friction",
             rubs,
             ", ".join(why for friction, why in frictions if friction > 0.0 or not rubs) or "nothing solid is there",
-            smooth if rubs else rough,
+            _switch_friction(scenario, smooth if rubs else rough, rubs),
         ),
-        Rule("sliding", kind == "sliding", why_moves, fixed if kind == "sliding" else {}),
-        Rule("driven", kind == "prescribed", why_moves, fixed if kind == "prescribed" else {}),
+        Rule("sliding", *why_moves("sliding")),
+        Rule("driven", *why_moves("prescribed")),
         Rule(
             "joined",
-            barrier is not None or bool(edges),
-            ", ".join(solid[1 if ground is not None else 0 :]) + " beside the ground"
+            joined,
+            "the ground has a profile"
+            if profile
+            else ", ".join(solid[1 if ground is not None else 0 :]) + " beside the ground"
             if ground is not None and len(solid) > 1
             else ", ".join(solid) + " alone"
             if solid
@@ -162,12 +193,30 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         ),
         Rule(
             "passing",
-            passing,
-            "the grid rides with the barrier past the domain's walls"
-            if passing
+            moves and (past or not scenario.plain),
+            "a barrier moves over a grid that rests"
+            if moves and not scenario.plain
+            else "the grid rides with the barrier past the domain's walls"
+            if past
             else "the grid rests or passes nothing",
         ),
+        Rule("profile", *_many_pieces(scenario)),
     ]
+
+
+def _many_pieces(scenario: Scenario) -> tuple[bool, str]:
+    """Whether the ground has so many pieces that points look for those about them, and why."""
+    if scenario.ground is None or scenario.ground.level:
+        return False, "the ground is level" if scenario.ground is not None else "there is no ground"
+    pieces = len(ground_body(scenario.ground).outline.segments)
+    return pieces > FEW, f"the ground has {pieces} {'piece' if pieces == 1 else 'pieces'}"
+
+
+def _switch_friction(scenario: Scenario, changes: dict[str, Any], rubs: bool) -> dict[str, Any]:
+    """The changes, where they switch friction off or on as a whole."""
+    ground = scenario.ground
+    further = bool(scenario.barriers) or (ground is not None and bool(ground.stretches))
+    return {} if rubs and further else changes
 
 
 def without_liquid(scenario: Scenario) -> dict[str, Any]:

@@ -55,6 +55,12 @@ class Effects:
     """Some places of contact share nodes, or act on a body that slides: their impulses are found together."""
     passing: bool = False
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
+    arriving: bool = False
+    """Some of the flow arrives at a section during the run."""
+    profile: bool = False
+    """The ground has many pieces, of which a point looks at those about its column of the grid alone."""
+    materials: bool = False
+    """Some material points have a skeleton of their own, of the same law."""
 
     @property
     def liquid(self) -> bool:
@@ -114,6 +120,9 @@ class Effects:
                 "driven",
                 "joined",
                 "passing",
+                "arriving",
+                "profile",
+                "materials",
             )
             if getattr(self, name)
         ]

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.scenario import Prescribed, Scenario, Sliding, Trapezoid, Wall
+from warp_mpm.scenario import Barrier, Prescribed, Scenario, Sliding, Trapezoid, Wall
+from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.scenario.site import all_standing, lowest_ground
 
 LARGEST_FITTED_GRID = 2_000_000
 """Most nodes that a grid fitted to the scene gets; beyond, the fitted edges move in and what leaves is counted."""
@@ -69,8 +71,10 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
         scenario: the scene.
         vertices: of the outlines of bodies beside the scenario's, [V, 2] each [m].
     """
+    if not scenario.plain:
+        return _site_extent(scenario, vertices)
     spacing, domain, flow = scenario.numerics.spacing_m, scenario.domain, scenario.flow
-    outline = flow.polygon
+    outline = np.concatenate(flow.outlines)
     x_low, y_low = (float(low) for low in outline.min(axis=0))
     x_high, y_high = (float(high) for high in outline.max(axis=0))
     length = x_high - x_low
@@ -100,11 +104,15 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
     elif scenario.ground is not None and scenario.ground.friction > 0.0:
         # A barrier that the flow pushes goes where the flow goes, but for a tail that the ground brings to rest.
         behind = max(behind, travel.downstream + length)
+    if flow.inflow is not None:
+        # Upstream of the section there is nothing but what is about to arrive; what comes back over it leaves.
+        x_low = min(x_low, flow.inflow.x_m) - APPROACH * spacing - travel.downstream
+        behind = 0.0
     ahead = reach + travel.upstream
     if barrier is not None and driven and isinstance(barrier.shape, Wall):
         # Nothing flows there; behind a wall at rest the same room costs memory, and no time.
         ahead = BEHIND_A_WALL * spacing
-    heap = heaped_height(scenario)
+    heap = max(heaped_height(scenario), _filled_height(scenario))
     highest = max(y_high, heap) if math.isfinite(heap) else y_high
     if scenario.ground is not None:
         bottom = 0.0
@@ -122,34 +130,108 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
         bottom=bottom,
         top=domain.top_m if domain.top_m is not None else highest + rise,
     )
-    excess = math.sqrt(wanted.nodes(spacing) / LARGEST_FITTED_GRID)
-    if excess <= 1.0:
-        return Extent(wanted, wanted, fast)
     # What is certain is kept if half of the nodes can hold it: where flow and barrier are, and a driven barrier's way.
     inner = Edges(x_low, x_high, bottom, y_high)
     if driven:
         way = Edges(x_low - travel.downstream, x_high + travel.upstream, bottom, highest)
         inner = way if way.nodes(spacing) <= 0.5 * LARGEST_FITTED_GRID else inner
+    return _bounded(scenario, wanted, inner, fast)
+
+
+def _bounded(scenario: Scenario, wanted: Edges, inner: Edges, fast: float) -> Extent:
+    """The wanted edges, drawn in toward what must be inside where the grid would be larger than a fitted one gets."""
+    domain, excess = scenario.domain, math.sqrt(wanted.nodes(scenario.numerics.spacing_m) / LARGEST_FITTED_GRID)
+    if excess <= 1.0:
+        return Extent(wanted, wanted, fast)
     edges = Edges(
         left=wanted.left if domain.left_m is not None else inner.left - (inner.left - wanted.left) / excess,
         right=wanted.right if domain.right_m is not None else inner.right + (wanted.right - inner.right) / excess,
-        bottom=bottom,
+        bottom=wanted.bottom,
         top=wanted.top if domain.top_m is not None else inner.top + (wanted.top - inner.top) / excess,
     )
     return Extent(edges, wanted, fast)
 
 
+def _filled_height(scenario: Scenario) -> float:
+    """Height [m] to which what arrives may fill the room between the section and a barrier, up to the height at which
+    it goes over the barrier or back over the section."""
+    inflow, barrier = scenario.flow.inflow, scenario.barrier
+    if inflow is None or barrier is None or not inflow.x_m < 0.0:
+        return 0.0
+    crest = barrier.shape.base_crest_height[2] if isinstance(barrier.shape, Trapezoid) else math.inf
+    filled = 2.0 * (scenario.flow.volume + scenario.flow.deposited_volume) / -inflow.x_m
+    return min(filled, crest, inflow.base + 2.0 * inflow.greatest_depth) + inflow.greatest_depth
+
+
+def _site_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]]) -> Extent:
+    """The same on a ground that is not level, or with several barriers: the grid rests, and holds their ways.
+
+    The flow may fall to the lowest ground of the profile, whose ends are those of a fitted domain, and rise from there
+    as high as twice its speed takes it.
+    """
+    domain, flow, ground = scenario.domain, scenario.flow, scenario.ground
+    assert ground is not None
+    outline = np.concatenate(flow.outlines)
+    if flow.inflow is not None:
+        outline = np.concatenate([outline, flow.inflow.approach(scenario.numerics.spacing_m)])
+    (x_low, y_low), (x_high, y_high) = outline.min(axis=0), outline.max(axis=0)
+    length, flow_top = float(x_high - x_low), float(y_high)
+    speed = 0.0
+    for _, x, barrier, standing in all_standing(scenario):
+        travel = travel_of(barrier, scenario)
+        speed = max(speed, travel.speed)
+        lying = np.array([[x, 0.0]]) if standing is None else standing
+        x_low = min(x_low, float(lying[:, 0].min()) - travel.upstream)
+        x_high = max(x_high, float(lying[:, 0].max()) + travel.downstream)
+        y_high = max(y_high, float(lying[:, 1].max()))
+    for corners in vertices:
+        (x_low, y_low), (x_high, y_high) = (
+            np.minimum((x_low, y_low), corners.min(axis=0)),
+            np.maximum((x_high, y_high), corners.max(axis=0)),
+        )
+    x_low, x_high, y_high = float(x_low), float(x_high), float(y_high)
+    first, last = ground.ends
+    left = domain.left_m if domain.left_m is not None else min(x_low, first) if first > -math.inf else x_low
+    right = domain.right_m if domain.right_m is not None else max(x_high, last) if last < math.inf else x_high
+    lowest = lowest_ground(scenario, left, right)
+    gx, gy = scenario.gravity.vector
+    time = scenario.output.end_time_s
+    fall = 2.0 * abs(gy) * max(flow_top - lowest, flow.depth) + 2.0 * abs(gx) * (x_high - x_low)
+    fast = 2.0 * math.sqrt((flow.speed + speed) ** 2 + fall)
+    reach = fast * time + 0.5 * abs(gx) * time**2
+    # Upstream a flow spreads as on level ground, unless it may run down there too.
+    upstream = ground.profile[ground.profile[:, 0] < float(outline[:, 0].min()), 1]
+    falls_back = gx < 0.0 or (len(upstream) > 0 and bool(upstream.min() < float(outline[:, 1].min())))
+    behind = reach if falls_back or speed > 0.0 else min(reach, 4.0 * max(length, flow.depth))
+    if flow.inflow is not None:
+        # What comes back over the section leaves; so does what would heap up there higher than twice the flow's depth.
+        behind, y_high = 0.0, max(y_high, flow.inflow.base + 3.0 * flow.inflow.greatest_depth)
+    rise = fast**2 / (2.0 * abs(gy)) if gy else math.inf
+    left = domain.left_m if domain.left_m is not None else min(x_low, max(x_low - behind, first))
+    right = domain.right_m if domain.right_m is not None else max(x_high, min(x_high + reach, last))
+    bottom = lowest_ground(scenario, left, right)
+    heap = heaped_height(scenario)
+    top = max(y_high, min(flow_top + fast * time, lowest + rise), heap if math.isfinite(heap) else 0.0)
+    if not ground.level:
+        top = max(top, ground.range(max(left, first), min(right, last))[1])
+    wanted = Edges(left, right, bottom, domain.top_m if domain.top_m is not None else top)
+    return _bounded(scenario, wanted, Edges(x_low, x_high, bottom, y_high), fast)
+
+
 def _height_of_fall(scenario: Scenario) -> float:
     """The flow's depth [m]; of a flow that begins above the ground, the height from which it falls."""
-    depth, top = scenario.flow.depth, float(scenario.flow.polygon[:, 1].max())
+    depth, top = scenario.flow.depth, float(np.concatenate(scenario.flow.outlines)[:, 1].max())
     return top if scenario.ground is not None and top > depth * (1.0 + 1e-6) else depth
 
 
 def barrier_travel(scenario: Scenario) -> Travel:
-    """How far and how fast the barrier gets until the end: a driven one exactly, one that slides at most."""
-    barrier, time = scenario.barrier, scenario.output.end_time_s
-    if barrier is None:
-        return Travel()
+    """How far and how fast the scene's first barrier gets until the end; see `travel_of`."""
+    return Travel() if scenario.barrier is None else travel_of(scenario.barrier, scenario)
+
+
+def travel_of(barrier: Barrier, scenario: Scenario) -> Travel:
+    """How far and how fast a barrier gets until the end: a driven one exactly, one that slides at most."""
+    time = scenario.output.end_time_s
     if isinstance(barrier.motion, Prescribed):
         return _driven(barrier.motion, time)
     if not isinstance(barrier.motion, Sliding):
@@ -159,7 +241,7 @@ def barrier_travel(scenario: Scenario) -> Travel:
     assert mass is not None
     held = barrier.motion.base_friction_coefficient * abs(gy)
     # The momentum of a flow that is all as fast as its front, shared with the barrier; friction at its base stops it.
-    flow_mass = flow.volume * flow.material.density
+    flow_mass = (flow.volume + flow.deposited_volume) * flow.material.density
     front = flow.speed + 2.0 * math.sqrt(abs(gy) * flow.depth)
     pushed = flow_mass / (flow_mass + mass) * front
     slowed = held - gx
@@ -217,9 +299,9 @@ def domain_caveats(scenario: Scenario) -> list[str]:
             f"fitted domain gets {LARGEST_FITTED_GRID:.1g} and ends at x = {edges.left:.3g} and {edges.right:.3g} m, "
             f"y = {edges.top:.3g} m. Give domain.left_m, right_m or top_m if more must stay."
         )
-    if scenario.barrier is None or not isinstance(scenario.barrier.motion, Prescribed):
+    if scenario.barrier is None or not isinstance(scenario.barrier.motion, Prescribed) or not scenario.plain:
         return found
-    outline = scenario.flow.polygon
+    outline = np.concatenate(scenario.flow.outlines)
     x_low, x_high = float(outline[:, 0].min()), float(outline[:, 0].max())
     for side, edge, place, way, cut in (
         ("left", domain.left_edge, domain.left_m, travel.downstream, x_low),

@@ -1,7 +1,7 @@
 """Plane geometry of a scene: the flow's outline, the barrier's outline, and what is measured on them.
 
 A polygon is an array of vertices [V, 2] in metres, not closed (the last vertex joins the first), in either
-orientation unless a function says otherwise. The x axis follows the ground, y is normal to it and points up; the toe
+orientation unless a function says otherwise. The x axis follows level ground, y is normal to it and points up; the toe
 of the barrier's upstream face is the origin.
 """
 
@@ -134,6 +134,20 @@ def depth_below_surface(polygon: Polygon, points: NDArray[np.float64]) -> NDArra
         height = y0 + (x[spans] - x0) * (y1 - y0) / (x1 - x0)
         above[spans] = np.minimum(above[spans], np.where(height >= y[spans], height, np.inf))
     return np.where(np.isfinite(above), above - y, 0.0)
+
+
+def surface_slope(polygon: Polygon, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """dy/dx [N] of the polygon's boundary straight above each point, as `depth_below_surface` finds it; 0 on or outside
+    the boundary."""
+    x, y = points[:, 0], points[:, 1]
+    above, slope = np.full(len(points), np.inf), np.zeros(len(points))
+    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        if x0 == x1:
+            continue
+        height = y0 + (x - x0) * (y1 - y0) / (x1 - x0)
+        nearer = (x >= min(x0, x1)) & (x <= max(x0, x1)) & (height >= y) & (height < above)
+        above, slope = np.where(nearer, height, above), np.where(nearer, (y1 - y0) / (x1 - x0), slope)
+    return slope
 
 
 def front_and_tail(depth: float, squares: float, distance: float) -> Polygon:

@@ -67,6 +67,7 @@ SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
     **dict.fromkeys(("definitions", "mechanism_measures", "verdict"), (dict, NoneType)),
     "notes": (list,),
+    "barriers": (list, NoneType),
 }
 """The same of its summary; figures of quantities that a script records are numbers too."""
 
@@ -299,6 +300,19 @@ class Results:
             ResultsError: the file is missing or damaged.
         """
         return read_time_series(self.path / run_folder.TIME_SERIES, self._own_quantities())
+
+    def barrier_displacements(self, snapshot: Snapshot) -> dict[str, float]:
+        """Displacement [m] of every barrier at the time of a snapshot, by its name.
+
+        Raises:
+            ResultsError: the time series is missing or damaged.
+        """
+        found = {"barrier": snapshot.barrier_displacement or 0.0}
+        for one in self.scenario.barriers:
+            column = f"{one.name}_barrier_displacement"
+            if one.motion.kind != "fixed" and column in self.time_series:
+                found[one.name] = float(np.interp(snapshot.time, self.time_series["time"], self.time_series[column]))
+        return found
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:

@@ -7,7 +7,7 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -17,6 +17,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.arrival_figures import arrival_figures, with_what_arrives
+from warp_mpm.barrier_figures import barrier_figures
 from warp_mpm.caveats import run_caveats, scene_caveats
 from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
@@ -130,7 +132,7 @@ def run_in_memory(
         "wall_time": time.perf_counter() - started,
     }
     columns = series.series()
-    summary = summarize(scenario, columns, snapshots.snapshots, _of_the_run(record))
+    summary = _summary(scenario, columns, snapshots.snapshots, record)
     summary["notes"] = [*scene_caveats(scenario), *run_caveats(record, summary)]
     kept = None if loads is None else _loads(loads)
     return MemoryRun(scenario, finished, columns, snapshots.snapshots, summary, kept)
@@ -139,7 +141,7 @@ def run_in_memory(
 def _loads(recorder: LoadsInMemory) -> Loads:
     surfaces = {}
     for stretch in recorder.stretches:
-        place, height = (stretch.begin[:, None] + stretch.along[:, None] * stretch.edges)[:2]
+        place, height = stretch.place(stretch.edges).T
         surfaces[stretch.surface] = SurfaceLoads(stretch.edges, place, height, recorder.pressures(stretch.surface))
     return Loads(np.array(recorder.times), surfaces)
 
@@ -370,13 +372,20 @@ def evaluate(path: str | Path, *, pictures: bool = True) -> dict[str, Any]:
     results, folder = Results.open(path), RunFolder(path)
     record = results.record
     with results.snapshots as snapshots:
-        summary = summarize(results.scenario, results.time_series, snapshots, _of_the_run(record))
+        summary = _summary(results.scenario, results.time_series, snapshots, record)
         summary["notes"] = [*scene_caveats(results.scenario), *run_caveats(record, summary)]
         folder.write(run_folder.SUMMARY, summary)
         _write_surfaces(results, path)
         if pictures:
             _draw(results, path)
     return summary
+
+
+def _summary(
+    scenario: Scenario, series: Mapping[str, NDArray[np.float64]], snapshots: Any, record: dict[str, Any]
+) -> dict[str, Any]:
+    summary = summarize(scenario, with_what_arrives(scenario, series), snapshots, _of_the_run(record))
+    return summary | arrival_figures(scenario, series, summary) | barrier_figures(scenario, series, snapshots)
 
 
 def _draw(results: Results, path: Path) -> None:
@@ -389,11 +398,11 @@ def _draw(results: Results, path: Path) -> None:
 
 
 def _write_surfaces(results: Results, path: Path) -> None:
-    """Barrier and ground beside the snapshots, as far as the material reaches."""
+    """Barriers and ground beside the snapshots, as far as the material reaches."""
     snapshots = results.snapshots
     displacements, edges = [], []
     for snapshot in snapshots:
-        displacements.append(snapshot.barrier_displacement)
+        displacements.append(results.barrier_displacements(snapshot))
         x, y = snapshot.position.T if len(snapshot.position) else np.zeros((2, 1))
         edges.append((x.min(), x.max(), y.max()))
     if edges:

@@ -32,10 +32,10 @@ from .simulator.bodies.loads import Patches, slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
-from .state.arrays import clock_arrays, grid_arrays, memory_for, point_arrays
+from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
-from .state.parameters import kernel_parameters
+from .state.parameters import kernel_parameters, material_parameters
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
@@ -65,6 +65,12 @@ IMPULSES = ("solid", "liquid", "alone", "rubbed")
 
 INTERVAL = ("begin", "reactions", "turned", "taken")
 """Parts of the mark of the last interval, as a state keeps them."""
+
+ARRIVED = ("conveyed", "inflow")
+"""Arrays of an inflow that change during a run."""
+
+GROWTHS = 32
+"""Times at most that a run with an inflow is captured anew, for more points."""
 
 LOADS = ("taken", "turned")
 """Sums of the barrier's slots and surfaces since t = 0."""
@@ -224,10 +230,12 @@ class Simulation:
             "grid": self._grid,
             "bodies": self._bodies,
             "contact": self._contact,
+            "arrival": self._arrival,
             "parameters": self._parameters,
             "book": self._book,
         }
-        self._counts = {"one": 1, "workers": self._workers, "points": self.material_points}
+        self._entry = initial.entry[initial.there :]
+        self._counts = {"one": 1, "workers": self._workers, "points": self._expected(0.0)}
         if self.effects.bodies:
             self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
@@ -236,17 +244,33 @@ class Simulation:
         self._kernels_of_a_step: tuple[str, ...] = ()
         self._ledger_graph: Any = None
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
+        further = {one.name for one in scenario.barriers}
+        self._further = [number for number, body in enumerate(self.bodies) if body.name in further]
         self._quantities = sampled_quantities(scenario, self.bodies)
         self._since = self.window()
         """When the last call of `advance` that made a step began."""
-        flow_mass = float(initial.solid_mass.sum() + initial.liquid_mass.sum())
+        moving = (initial.velocity != 0.0).any(axis=1)
+        flow_mass = float(initial.solid_mass[moving].sum() + initial.liquid_mass[moving].sum())
         self._scene_mark = saved.scene_mark(scenario.resolved())
         self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
         bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
-        points = point_arrays(scenario, effects, types, initial, liquid_bulk_modulus=bulk_modulus, device=device)
+        materials = (
+            material_parameters(scenario, effects, types, self._parameters, limits=self._limits)
+            if effects.materials
+            else []
+        )
+        points = point_arrays(
+            scenario,
+            effects,
+            types,
+            initial,
+            liquid_bulk_modulus=bulk_modulus,
+            materials=materials,
+            device=device,
+        )
         self._points, self._point_arrays = points.structure, points.arrays
         grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
@@ -259,6 +283,10 @@ class Simulation:
                 self.bodies, effects, types, self.grid, slots=self.slots, lanes=lanes, device=device
             )
             self._contact, self._contact_arrays = contact.structure, contact.arrays
+        self._arrival, self._arrival_arrays = None, {}
+        if effects.arriving:
+            arrival = arrival_arrays(scenario, types, device=device)
+            self._arrival, self._arrival_arrays = arrival.structure, arrival.arrays
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
         self._book = self._types.Book()
@@ -279,7 +307,8 @@ class Simulation:
         # On the CPU the host sees the device's own memory; elsewhere every look is a copy.
         self._seen = {}
         if device.is_cpu:
-            self._seen = {name: array.numpy() for name, array in (self._clock_arrays | self._body_arrays).items()}
+            watched = self._clock_arrays | self._body_arrays | self._arrival_arrays
+            self._seen = {name: array.numpy() for name, array in watched.items()}
             self._seen |= {name: self._contact_arrays[name].numpy() for name in LOADS if name in self._contact_arrays}
 
     # -- stepping ----------------------------------------------------------------------------------------------
@@ -287,7 +316,7 @@ class Simulation:
     def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
         kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
-        if self._commands is not None:
+        if self._commands is not None and command is not None:  # of no threads there is none
             self._commands.append((launch.kernel, command))
         if self._on_launch is not None:
             self._on_launch(launch.kernel)
@@ -306,6 +335,24 @@ class Simulation:
     def _sum_up(self) -> None:
         self._sums.zero_()
         self._launch(LEDGER, self._workers, [self._arguments[name] for name in LEDGER.takes])
+
+    def _expected(self, until: float) -> int:
+        """Material points that kernels go over up to a time [s]: what has yet to arrive comes last, and later."""
+        inflow = self.scenario.flow.inflow
+        if inflow is None:
+            return self.material_points
+        waiting = len(self._entry)
+        share = max(1, -(-waiting // GROWTHS))
+        # On the device the way is summed up in other pieces.
+        come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
+        return self.material_points - waiting + min(waiting, -(-come // share) * share)
+
+    def _make_room(self, until: float) -> None:
+        """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing."""
+        expected = self._expected(until)
+        if expected > self._counts["points"]:
+            self._counts["points"] = expected
+            self._graph = None
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -334,7 +381,7 @@ class Simulation:
     def arrays(self) -> dict[str, int]:
         """Every array that the simulation holds on the device, by name, with its bytes."""
         groups = {"points": self._point_arrays, "grid": self._grid_arrays, "bodies": self._body_arrays}
-        groups["contact"] = self._contact_arrays
+        groups |= {"contact": self._contact_arrays, "arrival": self._arrival_arrays}
         held = {f"{group}.{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
         return {name: int(array.capacity) for name, array in (held | self._clock_arrays).items()}
 
@@ -363,6 +410,7 @@ class Simulation:
         """
         if not math.isfinite(until) or until < self.time:
             raise ValueError(f"until = {until} must be finite and at least the present time {self.time:g} s")
+        self._make_room(until)
         self.prepare()
         self._fill(self._target, until)
         if until - self._clock_entry(at.TIME) < ONE_TIME * self.nominal_step:
@@ -388,6 +436,7 @@ class Simulation:
         Launches are prepared beforehand; what is left of their own cost, a few microseconds, is that of `forget`, which
         does next to nothing. The CPU waits for each launch, so that its time is its own.
         """
+        self._make_room(until)
         self._fill(self._target, until)
         self._fill(self._steps_left, MOST_STEPS_AT_ONCE)
         self._commands = []
@@ -428,6 +477,8 @@ class Simulation:
         Raises:
             ValueError: the run has begun, or a field is unknown here, of another shape or not finite.
         """
+        if len(self._entry):
+            raise ValueError("set_points knows no flow that arrives (flow.inflow)")
         if self.steps > 0:
             raise ValueError("set_points changes the initial state; this simulation has made steps already")
         now = self.points()
@@ -469,7 +520,7 @@ class Simulation:
         """Present numbers of clock, bodies, counters or sums; on the CPU they go on changing with the run."""
         if name in self._seen:
             return self._seen[name]
-        for arrays in (self._body_arrays, self._contact_arrays):
+        for arrays in (self._body_arrays, self._contact_arrays, self._arrival_arrays):
             if name in arrays:
                 return arrays[name].numpy()
         return self._clock_arrays[name].numpy()
@@ -531,8 +582,8 @@ class Simulation:
         x, y = self._read(field)[names.index(name)]
         return float(x), float(y)
 
-    def _barrier_number(self, field: str) -> float:
-        return float(self._read(field)[self._barrier]) if field in self._body_arrays else 0.0
+    def _number_of(self, body: int, field: str) -> float:
+        return float(self._read(field)[body]) if field in self._body_arrays else 0.0
 
     def set_barrier_velocity(self, velocity: float) -> None:
         """Drive the barrier at `velocity` [m/s] from now on; only for a barrier with prescribed motion.
@@ -568,7 +619,7 @@ class Simulation:
         `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N]. What the law or the transfer scheme
         keeps at a point besides, and has a meaning for, comes when it is named.
         """
-        inside = self._point_arrays["inside"].numpy() > 0
+        inside = self._point_arrays["inside"].numpy() == at.INSIDE
         rows = slice(None) if inside.all() else inside
         material: Any = self.scenario.flow.material
 
@@ -615,7 +666,7 @@ class Simulation:
         return Window(
             self._clock_entry(at.TIME),
             self._read("reactions").tolist(),
-            self._barrier_number("base_impulse"),
+            self._number_of(self._barrier, "base_impulse"),
             self._read("turned").tolist(),
             self._read("taken").copy(),
             reach=self.scenario.output.pressure_patch_s,
@@ -659,17 +710,18 @@ class Simulation:
                 )
         return values if names is None else {key: values[key] for key in values if key == "time" or key in names}
 
+    def _motion_of(self, number: int) -> BarrierNow:
+        body = self.bodies[number]
+        return BarrierNow(
+            self.body_displacement(body.name)[0],
+            self.body_velocity(body.name)[0],
+            self._number_of(number, "work"),
+            self._number_of(number, "base_work"),
+            body.motion.mass if isinstance(body.motion, Sliding) else 0.0,
+        )
+
     def _now(self, now: Window, since: Window, sums: Sequence[float]) -> Now:
-        barrier = BarrierNow()
-        if self._barrier is not None:
-            motion = self.bodies[self._barrier].motion
-            barrier = BarrierNow(
-                self.body_displacement(BARRIER)[0],
-                self.body_velocity(BARRIER)[0],
-                self._barrier_number("work"),
-                self._barrier_number("base_work"),
-                motion.mass if isinstance(motion, Sliding) else 0.0,
-            )
+        barrier = self._motion_of(self._barrier) if self._barrier is not None else BarrierNow()
         forces, base_force = mean_forces(self.bodies, now, since)
         loads = (
             None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, self._patches, now, since)
@@ -678,6 +730,7 @@ class Simulation:
             scenario=self.scenario,
             bodies=self.bodies,
             barrier=barrier,
+            further={self.bodies[number].name: self._motion_of(number) for number in self._further},
             time=self.time,
             time_step=self._clock_entry(at.TIME_STEP),
             elapsed=now.time - since.time,
@@ -690,6 +743,7 @@ class Simulation:
             sums=sums,
             departed=self._read("left").tolist(),
             balanced=self._read("balance").tolist(),
+            **({"arrived": self._read("inflow").tolist()} if self.effects.arriving else {}),
         )
 
     @property
@@ -714,7 +768,7 @@ class Simulation:
         }
 
     def _state_arrays(self) -> dict[str, Any]:
-        arrays = {f"points.{name}": array for name, array in self._point_arrays.items()}
+        arrays = {f"points.{name}": array for name, array in self._point_arrays.items() if name != "materials"}
         # Corner sums and the rest of the grid are rebuilt every step; only the blocks in use are remembered.
         arrays |= {
             "clock": self._clock,
@@ -727,6 +781,7 @@ class Simulation:
         }
         if self.slots is not None:
             arrays |= {f"contact.{name}": self._contact_arrays[name] for name in LOADS}
+        arrays |= {f"arrival.{name}": self._arrival_arrays[name] for name in ARRIVED if name in self._arrival_arrays}
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}
         if self.effects.joined:
             # Their impulses begin with those of the step before. Places that stand alone begin with none; how many they

@@ -121,7 +121,7 @@ def _weight(barrier: Barrier, flow_mass: float) -> list[str]:
     assert mass is not None
     told = f"barrier.motion.mass_kg_per_m = {mass:,.10g} kg/m"
     if isinstance(barrier.shape, Trapezoid):
-        area = geometry.area(barrier.shape.polygon)
+        area = geometry.area(barrier.shape.outline)
         density = mass / area
         if LIGHTEST <= density <= HEAVIEST:
             return []

@@ -80,8 +80,8 @@ class RunDisplay:
 
     def __enter__(self) -> Self:
         self._console.print(self._scenario.title, style="bold")
-        flow, rest = described(self._scenario)
-        self._console.print(f"{flow}\n{rest}; {self._device}", soft_wrap=True)
+        lines = "\n".join(described(self._scenario))
+        self._console.print(f"{lines}; {self._device}", soft_wrap=True)
         for sentence in scene_caveats(self._scenario):
             self._console.print(f"Note: {sentence}", soft_wrap=True)
         if self._console.is_terminal and not self._console.quiet:
@@ -129,6 +129,21 @@ class RunDisplay:
         self._console.print(f"Results are in {outcome.path}", soft_wrap=True)
 
 
+def _barrier_row(row: Mapping[str, Any]) -> str:
+    """Force, motion and volumes of one of several barriers."""
+    parts = []
+    if row["peak_force_filtered"] is not None:
+        when = "" if row["peak_force_filtered_time"] is None else f" at {row['peak_force_filtered_time']:.3f} s"
+        parts.append(FIGURES["peak_force_filtered"].text(row["peak_force_filtered"], ",.1f") + when)
+    if row["displacement"]:
+        parts.append(f"moved {row['displacement']:.2f} m")
+    if row["held_volume"] is not None:
+        parts.append(f"holds {row['held_volume']:.1f} m³/m, passed by {row['passed_volume']:.1f}")
+    if row["landing_distance"] is not None:
+        parts.append(f"landing {row['landing_distance']:.1f} m from its heel")
+    return "; ".join(parts)
+
+
 def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and value, with unit, of the figures that a person wants first; those that are None are left out."""
 
@@ -163,6 +178,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     mean_over = " and ".join(filter(None, (told(f"pressure_patch_{unit}", "g") for unit in "ms")))
     smallest, limit = summary.get("time_step_min"), summary.get("time_step_limit")
     rows = [
+        (words("inflow_volume"), told("inflow_volume", ",.1f")),
         (words("peak_force_filtered"), told("peak_force_filtered", at="peak_force_filtered_time")),
         ("  over one record", told("peak_force", at="peak_force_time")),
         ("  acting at a height of", told("peak_force_height", ",.2f")),
@@ -180,6 +196,7 @@ def summary_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         (words("barrier_displacement_final"), displacement(summary)),
         (f"volume [{FIGURES['retained_volume'].shown_unit}]", ", ".join(volumes) or None),
         ("mechanism seen so far" if impact_goes_on(summary) else "mechanism seen", summary.get("mechanism")),
+        *((f"barrier {row['name']}", _barrier_row(row)) for row in summary.get("barriers") or ()),
         *((words(name), relative(name)) for name in ("mass_error", "momentum_error", "energy_error")),
         (
             "time steps",

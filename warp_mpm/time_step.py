@@ -154,11 +154,28 @@ def nominal_step(scenario: Scenario) -> float:
 
 
 def step_limits(scenario: Scenario) -> StepLimits:
-    """Bounds on the time step of `scenario` (audit, section 3.4).
+    """Bounds on the time step of `scenario` (audit, section 3.4), with several materials the closest; the speed of
+    sound is that of the flow's.
 
     Raises:
-        ValueError: sound through the material has no finite speed.
+        ValueError: sound through a material has no finite speed.
     """
+    flow = scenario.flow
+    limits, *others = (
+        _limits(scenario.model_copy(update={"flow": flow.model_copy(update={"material": material})}))
+        for material in flow.materials
+    )
+    for other in others:
+        limits = StepLimits(
+            max(limits.wave_speed, other.wave_speed),
+            limits.sound_speed,
+            min(limits.drag_step, other.drag_step),
+            min(limits.law_step, other.law_step),
+        )
+    return limits
+
+
+def _limits(scenario: Scenario) -> StepLimits:
     flow, numerics = scenario.flow, scenario.numerics
     drag = math.inf
     if isinstance(flow, TwoPhaseFlow):

@@ -60,7 +60,7 @@ def write_vtu(results: Results, folder: Path) -> int:
             parts = outlines(results.scenario, extent)
             if parts:
                 name = f"surfaces_{number:05d}.vtu"
-                _write_surfaces(folder / name, parts, snapshot.barrier_displacement or 0.0)
+                _write_surfaces(folder / name, parts, results.barrier_displacements(snapshot))
                 entries.append((snapshot.time, 1, name))
         count = len(snapshots)
     with whole_file(folder / COLLECTION) as aside:
@@ -88,11 +88,11 @@ def _extent(results: Results) -> tuple[float, float, float]:
     return float(left.min()), float(right.max()), float(top.max())
 
 
-def _write_surfaces(path: Path, parts: list[tuple[int, NDArray]], displacement: float) -> None:
-    corners = [outline + np.array([displacement if part else 0.0, 0.0]) for part, outline in parts]
+def _write_surfaces(path: Path, parts: list[tuple[int, str, NDArray]], displacements: Mapping[str, float]) -> None:
+    corners = [outline + np.array([displacements.get(name, 0.0), 0.0]) for _, name, outline in parts]
     points = _in_space(np.concatenate(corners))
     offsets = np.cumsum([len(outline) for outline in corners])
-    numbers = np.array([part for part, _ in parts], dtype=np.int32)
+    numbers = np.array([part for part, _, _ in parts], dtype=np.int32)
     _write(path, points, np.arange(len(points)), offsets, VTK_POLYGON, {}, {"part": numbers})
 
 

@@ -15,6 +15,8 @@ KNOWN_SHORT = {
     "collapse-by-rate": ("beads of 1 mm, a = 4: run-out",),
     # Quadrature of the stress in cells that the face cuts; 16 points per cell leave a fourth.
     "at-rest": ("greatest speed",),
+    # The same at the ground, where a profile cuts cells.
+    "basin": ("greatest speed at the end",),
     # Five cells a radius lose 0.8 % of their angular momentum in two turns at the full time step, ten cells 0.2 %.
     "rotation": ("5 cells a radius, Courant number 0.95: angular momentum",),
     # 1.7 to 2 % of the displacement at the full step, 1.3 % at the half: of the first order in the time step.

@@ -14,7 +14,7 @@ import pytest
 import setuptools
 
 ROOT = Path(__file__).parents[2]
-SCENES = sorted(path.relative_to(ROOT) for path in (ROOT / "scenarios").rglob("*.json"))
+SCENES = sorted(path.relative_to(ROOT) for path in (ROOT / "scenarios").rglob("*.*"))
 
 
 def packed(monkeypatch):
@@ -103,7 +103,7 @@ def test_a_wheel_does_without_the_checkout(installed, tmp_path):
     ):
         done = typed(installed, folder, *words)
         assert done.returncode == 0, (words, done.stderr)
-    copied = sorted(path.relative_to(folder) for path in (folder / "scenarios").rglob("*.json"))
+    copied = sorted(path.relative_to(folder) for path in (folder / "scenarios").rglob("*.*"))
     assert copied == SCENES
     record = json.loads((folder / "runs" / "set_iib" / "run.json").read_text())
     assert record["status"] == "finished"

@@ -101,7 +101,7 @@ def test_slots_add_up_to_the_reactions(load_scene, name):
         normal, liquid, along = taken[stretch.slots].sum(axis=0)
         total = normal + (liquid if simulation.effects.two_phase else 0.0)
         k = names.index(stretch.surface)
-        expected = -total * pieces.normal[stretch.piece] + along * stretch.along
+        expected = -total * pieces.normal[stretch.pieces[0]] + along * stretch.along[0]
         scale = max(1.0, float(np.abs(taken[stretch.slots]).sum()))
         # Single precision rounds what a place gives in a step, the same in both; the sums are double.
         within = 1e-6 if scenario.numerics.precision == "float32" else 1e-13

@@ -22,7 +22,11 @@ from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError
 
 ROOT = Path(__file__).parents[2]
-FILES = sorted(path.relative_to(ROOT / "scenarios").as_posix() for path in (ROOT / "scenarios").rglob("*.json"))
+SCENES, TABLES = (
+    sorted(path.relative_to(ROOT / "scenarios").as_posix() for path in (ROOT / "scenarios").rglob(f"*.{kind}"))
+    for kind in ("json", "csv")
+)
+FILES = SCENES + TABLES
 
 
 def scenarios(*arguments):
@@ -31,7 +35,7 @@ def scenarios(*arguments):
 
 def test_every_scene_is_listed_with_its_title():
     lines = [line.split(maxsplit=1) for line in scenarios().stdout.splitlines()]
-    assert sorted(f"{name}.json" for name, _ in lines) == FILES
+    assert sorted(f"{name}.json" for name, _ in lines) == SCENES
     assert lines[0] == ["case_1", "Case 1: standing jump, sliding barrier at 60 degrees, 10 m/s"]
     rows = json.loads(scenarios("--json").stdout)
     assert [row["title"] for row in rows] == [title for _, title in lines]
@@ -42,6 +46,7 @@ def test_scenes_are_copied_where_the_examples_look_for_them(tmp_path):
     answer = scenarios("--out", tmp_path / "scenarios")
     assert answer.exit_code == 0
     assert answer.stderr == f"Copied into {tmp_path / 'scenarios'}: {len(FILES)} files.\n"
+    assert {"site_channel.csv", "site_two_surges.csv"} <= set(TABLES)
     for name in FILES:
         assert (tmp_path / "scenarios" / name).read_bytes() == (ROOT / "scenarios" / name).read_bytes()
     again = scenarios("--out", tmp_path / "scenarios")

@@ -82,7 +82,7 @@ def area(scenario: Scenario) -> float:
     """Section of the barrier [m²]."""
     assert scenario.barrier is not None
     assert isinstance(scenario.barrier.shape, Trapezoid)
-    return geometry.area(scenario.barrier.shape.polygon)
+    return geometry.area(scenario.barrier.shape.outline)
 
 
 def mass(scenario: Scenario) -> float:

@@ -171,7 +171,7 @@ def freed(scenario: Scenario, paths: Iterable[str]) -> tuple[Scenario, list[str]
         told.append(f"{SHAPE}{follows} follows from the other measures of the barrier.")
         motion, weighed = barrier.motion, "barrier.motion.mass_kg_per_m" in paths
         if isinstance(motion, Sliding) and motion.mass_kg_per_m is not None and not weighed:
-            density = motion.mass_kg_per_m / geometry.area(barrier.shape.polygon)
+            density = motion.mass_kg_per_m / geometry.area(barrier.shape.outline)
             changes |= {"barrier.motion.mass_kg_per_m": None, "barrier.motion.density_kg_per_m3": density}
             told.append(f"The barrier keeps its density of {density:.4g} kg/m³; its mass follows from its shape.")
     return scenario.replaced(changes), told

@@ -8,17 +8,32 @@ from typing import Annotated, Any
 
 import typer
 
-from analytic.command_line import BAD_INPUT, complain, tell
+from analytic.command_line import BAD_INPUT, complain, refusals, tell
 
 
 def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PICTURE",
+            help="Draw the scene there, with ground, flow, barriers and domain to scale: a png, pdf or svg file.",
+            show_default="no picture",
+        ),
+    ] = None,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print what was found as JSON: for each file its problems, notes and numbers."),
     ] = False,
 ) -> None:
-    """Check scenario files and tell what they describe; nothing is run or written."""
+    """Check scenario files and tell what they describe; nothing is run, and nothing written but the picture."""
+    if plot is not None:
+        with refusals():
+            if len(files) > 1:
+                raise ValueError(f"--plot draws one scene, {len(files)} were given.")
+            from warp_mpm import plotting
+
+            plotting.check_path(plot)
     from warp_mpm.caveats import scene_caveats
     from warp_mpm.description import described, described_domain, described_material, numbers
     from warp_mpm.regime import described_regime
@@ -47,3 +62,7 @@ def check(
         typer.echo(json.dumps(found, indent=2, ensure_ascii=False))
     if not all(one["valid"] for one in found):
         raise typer.Exit(BAD_INPUT)
+    if plot is not None:
+        with refusals():
+            plotting.save(plotting.scene(scenario, domain=True), plot)
+            typer.echo(str(plot))

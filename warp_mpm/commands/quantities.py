@@ -25,14 +25,16 @@ def quantities(
     The columns of timeseries.csv, the arrays of the snapshots, and the key figures of summary.json.
     """
     with refusals():
-        from warp_mpm.quantities import NAMED, TIME_SERIES, recorded_quantities
+        from warp_mpm.quantities import NAMED, TIME_SERIES, further_quantities, recorded_quantities
         from warp_mpm.quantities.figures import FIGURES
         from warp_mpm.quantities.points import POINT_FIELDS
         from warp_mpm.scenario import Scenario
 
         columns = list(NAMED.values())
         if scenario is not None:
-            columns = [TIME_SERIES[key] for key in recorded_quantities(Scenario.load(scenario))]
+            scene = Scenario.load(scenario)
+            known = {**TIME_SERIES, **further_quantities(scene)}
+            columns = [known[key] for key in recorded_quantities(scene)]
         files: dict[str, list[Any]] = {
             "timeseries.csv": columns,
             "snapshots.vtkhdf": list(POINT_FIELDS.values()),

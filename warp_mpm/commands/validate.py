@@ -68,7 +68,7 @@ def validate(
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 160
-    results = []
+    results: list[page.Result] = []
     for case in cases:
         try:
             with console.status(f"{case.name} ..."):

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.scenario import Prescribed, Scenario, TwoPhaseMaterial
-from warp_mpm.simulator.bodies.of_scene import barrier_body
+from warp_mpm.scenario.site import lowest_ground
+from warp_mpm.simulator.bodies.of_scene import barrier_bodies, ground_body
 from warp_mpm.time_step import step_limits
 
 
@@ -17,16 +18,24 @@ def impact_speed(scenario: Scenario) -> float:
 
     H is the height that it can fall, with what it covers downhill on a slope; v_b the speed of a driven barrier.
     """
-    outline = scenario.flow.polygon
+    outline = np.concatenate(scenario.flow.outlines)
     gx, gy = scenario.gravity.vector
-    lowest = 0.0 if scenario.ground is not None else scenario.domain.bottom_m
+    lowest = scenario.domain.bottom_m
+    if scenario.ground is not None:
+        lowest = lowest_ground(scenario, *_between(scenario))
     height = outline[:, 1].max() - (lowest if lowest is not None else outline[:, 1].min())
     time = scenario.output.end_time_s
     downhill = abs(gx) * (scenario.flow.speed * time + 0.5 * abs(gx) * time**2)
     speed = math.sqrt(scenario.flow.speed**2 + 2.0 * (abs(gy) * height + downhill))
-    if scenario.barrier is not None and isinstance(scenario.barrier.motion, Prescribed):
-        speed += max(abs(velocity) for velocity in scenario.barrier.motion.velocities_m_per_s)
+    driven = [barrier.motion for _, _, barrier in scenario.all_barriers if isinstance(barrier.motion, Prescribed)]
+    speed += max((abs(velocity) for motion in driven for velocity in motion.velocities_m_per_s), default=0.0)
     return speed
+
+
+def _between(scenario: Scenario) -> tuple[float, float]:
+    """Least and greatest x [m] of the domain, of what is given of it."""
+    left, right = scenario.domain.left_m, scenario.domain.right_m
+    return -math.inf if left is None else left, math.inf if right is None else right
 
 
 def shock_speed(scenario: Scenario, speed: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
@@ -78,10 +87,11 @@ def closing_angle(scenario: Scenario) -> float:
     along = (end - begin) / np.linalg.norm(end - begin, axis=1)[:, None]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
     surfaces = []
+    bodies = barrier_bodies(scenario)
     if scenario.ground is not None:
-        surfaces.append(((0.0, 1.0), 0.0))
-    if scenario.barrier is not None:
-        pieces = barrier_body(scenario.barrier).outline.segments
+        bodies.append(ground_body(scenario.ground))
+    for body in bodies:
+        pieces = body.outline.segments
         surfaces += [((nx, ny), offset) for (nx, ny), offset in zip(pieces.normal, pieces.offset, strict=True)]
     domain = scenario.domain
     if domain.left_edge == "wall" and domain.left_m is not None:

@@ -16,7 +16,7 @@ from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
 from warp_mpm.recording import Recorder, Schedule, SeriesInMemory, Watcher, record_until
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
-from warp_mpm.simulator.bodies.of_scene import barrier_body
+from warp_mpm.simulator.bodies.of_scene import BARRIER, barrier_bodies, ground_body
 from warp_mpm.simulator.laws import LAWS
 from warp_mpm.snapshot import Snapshot, snapshot_of
 from warp_mpm.summary import impact_figures, momentum_error
@@ -189,7 +189,7 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
     x, y = snapshot.position.T
     depth = np.zeros(len(x))
     if scenario.ground is not None:
-        depth = np.maximum(depth, -y)
+        depth = np.maximum(depth, -ground_body(scenario.ground).outline.distance(snapshot.position))
     domain = scenario.domain
     if domain.left_edge == "wall" and domain.left_m is not None:
         depth = np.maximum(depth, domain.left_m - x)
@@ -197,9 +197,10 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
         depth = np.maximum(depth, x - domain.right_m)
     if domain.top_edge == "wall" and domain.top_m is not None:
         depth = np.maximum(depth, y - domain.top_m)
-    if scenario.barrier is not None:
-        seen = snapshot.position - [snapshot.barrier_displacement or 0.0, 0.0]
-        depth = np.maximum(depth, -barrier_body(scenario.barrier).outline.distance(seen))
+    for body in barrier_bodies(scenario):
+        if body.name == BARRIER or not body.moves:  # how far others have moved is not in a snapshot
+            moved = snapshot.barrier_displacement or 0.0 if body.name == BARRIER else 0.0
+            depth = np.maximum(depth, -body.outline.distance(snapshot.position - [moved, 0.0]))
     return float(depth.max() / scenario.numerics.spacing_m)
 
 

@@ -6,10 +6,12 @@ from typing import Any
 import warp as wp
 
 from ..simulator.bodies.kernels import DEEP
+from .arrival import make_arrival
 from .elementary import make_elementary
 from .layout import (
     DIVERGED,
     GAPS_BOUNDED,
+    INSIDE,
     LEFT_ENERGY,
     LEFT_LIQUID_MASS,
     LEFT_MOMENTUM_X,
@@ -63,6 +65,7 @@ def make_constitutive(
     Book = types.Book
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
+    about = bodies_of.about if BODIES else None
     RESTING = not effects.passing
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
@@ -70,6 +73,7 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
+    MATERIALS = effects.materials
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
@@ -80,10 +84,8 @@ def make_constitutive(
         return -wp.log(wp.clamp(filling, F(1.0e-12), F(1.0)))
 
     @wp.func
-    def leave(points: Points, p: wp.int32, x: V2, parameters: Parameters, left: wp.array(dtype=wp.float64)):
-        """Take a point out of the domain, and keep account of what it takes along."""
-        points.inside[p] = 0
-        # It is passed over from now on, but by `update`, to which it is a point at rest.
+    def rest(points: Points, p: wp.int32):
+        """Make a point one at rest to `update`, which passes over all of them: nothing of it changes."""
         points.gradient[p] = V4()
         if CORNERS:
             points.smooth[p] = S()
@@ -92,6 +94,12 @@ def make_constitutive(
         if OWN_DIVERGENCE:
             points.liquid_divergence[p] = F(0.0)
         law_leave(points, p)
+
+    @wp.func
+    def leave(points: Points, p: wp.int32, x: V2, parameters: Parameters, left: wp.array(dtype=wp.float64)):
+        """Take a point out of the domain, and keep account of what it takes along."""
+        points.inside[p] = 0
+        rest(points, p)  # passed over from now on, but by `update`
         reference = points.reference_volume[p]
         v = points.velocity[p]
         solid = parameters.solid_density * reference
@@ -120,7 +128,7 @@ def make_constitutive(
     ):
         """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) != wp.static(INSIDE):
             return
         time_step = F(book.clock[wp.static(TIME_STEP)])
         shift = F(grid.shift[0])
@@ -166,8 +174,7 @@ def make_constitutive(
                         seen = x
                         if MOVING:
                             seen -= read(bodies.next, body)
-                        first_piece = read(bodies.first_piece, body)
-                        last_piece = read(bodies.first_piece, body + 1)
+                        first_piece, last_piece = about(bodies, body, wp.int32(sx), parameters.columns)
                         pushed = set_back(bodies.pieces, first_piece, last_piece, seen, F(-0.5) * parameters.spacing)
                         if pushed[0] != F(0.0) or pushed[1] != F(0.0):
                             x += pushed
@@ -228,6 +235,8 @@ def make_constitutive(
         Points that have left pass through as well, as `leave` has made them: at rest, so that nothing changes.
         """
         p = wp.tid()
+        if MATERIALS:
+            parameters = points.materials[read(points.material, p)]
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
         divergence = gradient[0] + gradient[3]
@@ -304,7 +313,7 @@ def make_constitutive(
     def bound(points: Points, parameters: Parameters, book: Book):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) <= 0:
             return
         grains = parameters.grain_share * read(points.reference_volume, p)
         volume = read(points.volume, p)
@@ -323,12 +332,16 @@ def make_constitutive(
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
+    if effects.arriving:
+        kernels.__dict__.update(make_arrival(types, pore, rest, module).__dict__)
     if not AT_ONCE:
 
         @wp.kernel(module=module)
         def yielding(points: Points, parameters: Parameters, book: Book):
             """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
             p = wp.tid()
+            if MATERIALS:
+                parameters = points.materials[read(points.material, p)]
             gap = F(0.0)
             if OPENS:
                 gap = read(points.solid_gap, p)

@@ -22,6 +22,7 @@ from .elementary import make_elementary
 from .layout import (
     BARRIER_ITERATIONS,
     BARRIER_UNCONVERGED,
+    BLOCK_SHIFT,
     SLOT_ALONG,
     SLOT_LIQUID,
     SLOT_NORMAL,
@@ -367,13 +368,28 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         react(bodies, body, push)
 
     @wp.func
+    def in_use(grid: Grid, i: wp.int32, j: wp.int32) -> wp.bool:
+        """Whether any of the blocks that hold the nodes around one holds material: most places of a long outline are
+        dry, and need not look at their nodes."""
+        left = (i - 1) >> wp.static(BLOCK_SHIFT)
+        right = (i + 1) >> wp.static(BLOCK_SHIFT)
+        low = (j - 1) >> wp.static(BLOCK_SHIFT)
+        high = (j + 1) >> wp.static(BLOCK_SHIFT)
+        return (
+            grid.block[left, low] != 0
+            or grid.block[right, low] != 0
+            or grid.block[left, high] != 0
+            or grid.block[right, high] != 0
+        )
+
+    @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
         if contact.fixed[e] == 0:
             at = contact.position[e] + displaced(bodies, contact.body[e])
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
             contact.first[e] = wp.int32(-1)
-            if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
+            if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1 and in_use(grid, i, j):
                 contact.first[e] = (i - 1) * parameters.rows + j - 1
                 contact.weight_x[e] = weights(fx)
                 contact.weight_y[e] = weights(fy)

@@ -55,6 +55,15 @@ LIMITERS_SIZE = 2
 FASTEST = 1.0e5
 """Speed [m/s] beyond which a run has diverged, whatever the scene."""
 
+# Where a material point is, an entry of the points' `inside`.
+WAITING = -1
+"""It has yet to arrive."""
+OUTSIDE = 0
+"""It has left."""
+INSIDE = 1
+HELD = 2
+"""It approaches the section of an inflow, at its prescribed velocity: the nodes feel it, the records do not."""
+
 # Counters, an int32 array.
 STEPS = 0
 DIVERGED = 1
@@ -98,6 +107,30 @@ LEFT_MOMENTUM_X = 2
 LEFT_MOMENTUM_Y = 3
 LEFT_ENERGY = 4
 LEFT_SIZE = 5
+
+# What has arrived at the section of an inflow, a float64 array.
+INFLOW_SOLID_MASS = 0
+INFLOW_LIQUID_MASS = 1
+INFLOW_MOMENTUM_X = 2
+"""With the mass, and by the thrust of what is held upstream of the section."""
+INFLOW_MOMENTUM_Y = 3
+INFLOW_ENERGY = 4
+INFLOW_SIZE = 5
+
+# How far what arrives has come, a float64 array.
+CONVEYED_WAY = 0
+"""Time integral of the mean velocity [m] at the end of the step."""
+CONVEYED_BEFORE = 1
+"""The same at its start."""
+CONVEYED_SPEED = 2
+"""Mean velocity at the end of the step [m/s]."""
+CONVEYED_SPEED_BEFORE = 3
+CONVEYED_INTERVAL = 4
+"""Of the table, in which the time lies."""
+CONVEYED_STRETCH = 5
+"""Change of the velocity along x at the section, at the end of the step [1/s]."""
+CONVEYED_STRETCH_BEFORE = 6
+CONVEYED_SIZE = 7
 
 # Entries of a slot of the barrier (`simulator.bodies.loads`): impulses since t = 0 [N s/m].
 SLOT_NORMAL = 0
@@ -171,6 +204,9 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["viscous_pressure"] = array(dtype=scalar)
     if effects.two_phase and not effects.volumetric_smoothing:
         points["liquid_divergence"] = array(dtype=scalar)
+
+    if effects.arriving:
+        points["pace"] = array(dtype=scalar)  # velocity of what arrives over its mean over the depth
 
     for owner in (effects.skeleton, effects.scheme):
         points |= {name: array(dtype=getattr(types, field.kind)) for name, field in owner.point_fields.items()}
@@ -250,12 +286,31 @@ def layout(effects: Effects) -> SimpleNamespace:
     bodies = body_fields(effects, scalar, V2, V4, P)
     contact = contact_fields(effects, scalar, V2, V3) if effects.bodies else {}
 
+    arrival: dict[str, Any] = {}
+    if effects.arriving:
+        arrival = {
+            "times": array(dtype=wp.float64),
+            "velocities": array(dtype=wp.float64),
+            "ways": array(dtype=wp.float64),
+            "stretches": array(dtype=wp.float64),
+            "conveyed": array(dtype=wp.float64),
+            "inflow": array(dtype=wp.float64),
+            "section": wp.float64,  # x [m]
+            "base": wp.float64,  # y of the underside at the section [m]
+            "slope": wp.float64,  # dy/dx of the ground beneath the approach
+            "entry": wp.float64,  # x of the upstream end of the approach [m]
+            "fastest": wp.float64,  # greatest velocity of the table, at any height [m/s]
+        }
+        types.Arrival = _structure("Arrival", arrival)
+    types.Parameters = _structure("Parameters", parameters)
+    if effects.materials:
+        points["material"] = array(dtype=wp.int32)  # place in the next
+        points["materials"] = array(dtype=types.Parameters)
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)
-    types.Parameters = _structure("Parameters", parameters)
     types.Bodies = _structure("Bodies", bodies)
     types.Contact = _structure("Contact", contact)
     types.Book = _structure("Book", BOOK)
-    types.point_fields, types.grid_fields = points, grid
-    types.body_fields, types.contact_fields = bodies, contact
+    types.point_fields, types.grid_fields, types.parameter_fields = points, grid, parameters
+    types.body_fields, types.contact_fields, types.arrival_fields = bodies, contact, arrival
     return types

@@ -6,6 +6,7 @@ import warp as wp
 
 from .elementary import make_elementary
 from .layout import (
+    INSIDE,
     LEDGER_ELASTIC,
     LEDGER_GRAVITATIONAL,
     LEDGER_KINETIC,
@@ -36,6 +37,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     RELAXATION = effects.pressure_relaxation
     BODIES = effects.bodies
     MOVING = effects.moving
+    MATERIALS = effects.materials
     Bodies = types.Bodies
     Book = types.Book
 
@@ -88,7 +90,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         # Each thread sums for itself and adds to the common sums once.
         p = wp.tid()
         while p < points.inside.shape[0]:
-            if read(points.inside, p) != 0:
+            if read(points.inside, p) == wp.static(INSIDE):
                 reference = read(points.reference_volume, p)
                 volume = read(points.volume, p)
                 v = read(points.velocity, p)
@@ -110,7 +112,11 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                 s = read(points.stress, p)
                 squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
                 grains = parameters.grain_share * reference
-                elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
+                if MATERIALS:
+                    own = points.materials[read(points.material, p)]
+                    elastic_energy += stored_in_skeleton(s, volume, grains, own)
+                else:
+                    elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
                 # Not negative, any of them, so that what is not finite in one shows in the sum.
                 sound = squares + volume + kinetic
                 if LIQUID:

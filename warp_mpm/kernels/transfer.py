@@ -61,6 +61,9 @@ def make_transfer(
     LIQUID_ALONE = effects.liquid_alone
     ALONE_OF_MIXTURE = LIQUID_ALONE and not TWO_PHASE
     in_hull = bodies_of.in_hull if ALONE_OF_MIXTURE else None
+    about = bodies_of.about if ALONE_OF_MIXTURE else None
+    nearest = bodies_of.nearest if ALONE_OF_MIXTURE else None
+    PROFILE = effects.profile
     MOVING = effects.moving
     RESTING = not effects.passing
     Bodies = types.Bodies
@@ -116,7 +119,7 @@ def make_transfer(
         compression positive: audit 3.4, action and reaction between the phases included.
         """
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) <= 0:
             return
         x = read(points.position, p)
         shift = F(grid.shift[0])
@@ -216,9 +219,13 @@ def make_transfer(
                             moved = bodies.displacement[body]
                             seen -= V2(F(moved[0]), F(moved[1]))
                         reach = F(wp.static(RUBBED)) * parameters.spacing
-                        first_piece = read(bodies.first_piece, body)
-                        last_piece = read(bodies.first_piece, body + 1)
-                        if in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
+                        first_piece, last_piece = about(bodies, body, ci, parameters.columns)
+                        if PROFILE:
+                            # In a valley no piece alone tells that a place is far away.
+                            distance, _direction, _piece = nearest(bodies.pieces, first_piece, last_piece, seen)
+                            if distance < reach:
+                                rubbed = wp.bool(True)
+                        elif in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
                             rubbed = wp.bool(True)
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
@@ -256,7 +263,7 @@ def make_transfer(
     def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
         """Velocities and velocity gradient from the nodes to the points; volume strain rates to the corners."""
         p = wp.tid()
-        if read(points.inside, p) == 0:
+        if read(points.inside, p) <= 0:
             return
         x = read(points.position, p)
         shift = F(grid.shift[0])

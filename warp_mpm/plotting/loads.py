@@ -27,7 +27,9 @@ def loads_by_height(results: Results) -> Figure:
     if len(loads.times) < 2:
         raise ResultsError(f"{results.path} has no loads by height to draw: the run ended before its second sample.")
     face, pressure = loads.surfaces["impact"], NAMED["pressure_patch"]
-    time, height = loads.times, face.height
+    # On a face with steps or a lip a height is no place: the way along it is.
+    upward = bool((np.diff(face.height) > 0.0).all())
+    time, height = loads.times, face.height if upward else face.edges
     top = _reached(face.pressures["normal"], height)
     shares = patches(face.edges, output.pressure_patch_m)
     means = {
@@ -47,7 +49,7 @@ def loads_by_height(results: Results) -> Figure:
     image = over_time.pcolormesh(edges, height, rows.T, cmap="viridis", vmin=0.0, rasterized=True)
     words = f"mean over {output.pressure_patch_m:g} m and {output.pressure_patch_s:g} s"
     figure.colorbar(image, ax=over_time, label=f"normal pressure [{pressure.shown_unit}],\n{words}", pad=0.01)
-    if "impact_force_height" in series and "impact_force_x" in series:
+    if upward and "impact_force_height" in series and "impact_force_x" in series:
         force = moving_mean(series["time"], series["impact_force_x"])
         moment = moving_mean(series["time"], series["impact_force_x"] * series["impact_force_height"])
         pressed = force > 0.02 * max(float(force.max()), 1e-300)
@@ -55,13 +57,15 @@ def loads_by_height(results: Results) -> Figure:
         over_time.plot(series["time"], acting, color="white", linewidth=2.4)
         over_time.plot(series["time"], acting, color=EDGE, linewidth=1.2, label="height of the resultant")
         over_time.legend(fontsize=8, loc="upper right")
-    over_time.set(xlabel="time [s]", ylabel="height on the face [m]", ylim=(float(height[0]), top))
+    over_time.set(
+        xlabel="time [s]", ylabel=f"{'height' if upward else 'way'} on the face [m]", ylim=(float(height[0]), top)
+    )
 
     for name, values in means.items():
         colour, words = (BLUE, "both phases") if name == "normal" else (ORANGE, "pore pressure")
         envelope.stairs(values.max(axis=0), height, orientation="horizontal", baseline=None, color=colour, label=words)
     acts = results.summary.get("peak_force_height")
-    if acts is not None:
+    if acts is not None and upward:
         envelope.axhline(acts, color=GREEN, linewidth=1.2, linestyle="--", label=FIGURES["peak_force_height"].words)
     envelope.set(xlabel=f"greatest pressure [{pressure.shown_unit}]", xlim=(0.0, None))
     envelope.legend(fontsize=8)

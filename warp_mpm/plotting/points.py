@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon as PolygonPatch
-from matplotlib.patches import Rectangle
 
 from warp_mpm.fields import colour_limits, field_named, field_values
-from warp_mpm.plotting.style import BARRIER, EDGE, GREY, GROUND, heading
+from warp_mpm.plotting.site import draw_barriers, draw_ground, draw_section, lowest
+from warp_mpm.plotting.style import heading
 from warp_mpm.quantities.points import Drawn
 from warp_mpm.results import Results, ResultsError, Snapshot
-from warp_mpm.scenario import Scenario, Trapezoid
+from warp_mpm.scenario import Scenario
+from warp_mpm.scenario.site import all_standing
 
 STILL_SHARES = (1 / 6, 1 / 3, 2 / 3)
 """Times of still pictures as shares of a run; of the paper's 6 s they are 1, 2 and 4 s, as in its Figs. 4 to 6."""
@@ -94,7 +94,7 @@ def field_panels(runs: Sequence[Results], name: str, times: Sequence[float] | No
         for row, frame in enumerate(frames[column]):
             panel = axes[row, column]
             drawn = draw_points(panel, frame, values[column][row], field, (low, high))
-            draw_surroundings(panel, results.scenario, frame, view)
+            draw_surroundings(panel, results.scenario, frame, view, results.barrier_displacements(frame))
             greatest = f"{values[column][row].max(initial=0.0):.3g} {field.shown_unit.strip('-')}"
             caption = f"t = {frame.time:.2f} s, greatest {greatest.strip()}"
             if row == 0 and len(runs) > 1:
@@ -137,13 +137,14 @@ def window(scenario: Scenario, frames: Sequence[Snapshot]) -> Window:
     ahead would leave the rest too small to see."""
     spans = [np.quantile(frame.position, (0.005, 0.97), axis=0) for frame in frames if len(frame.position)]
     points = np.concatenate([*spans, np.zeros((1, 2))])
-    if scenario.barrier is not None and isinstance(scenario.barrier.shape, Trapezoid):
-        outlines = [_moved(scenario.barrier.shape, frame.barrier_displacement or 0.0) for frame in frames]
-        points = np.concatenate([points, *outlines])
+    for name, _, _, standing in all_standing(scenario):
+        if standing is not None:
+            moved = [frame.barrier_displacement or 0.0 if name == "barrier" else 0.0 for frame in frames]
+            points = np.concatenate([points, *(standing + np.array([shift, 0.0]) for shift in moved)])
     (left, bottom), (right, high) = points.min(axis=0), points.max(axis=0)
     margin = 0.03 * max(right - left, high - bottom)
     if scenario.ground is not None:
-        bottom = 0.0
+        bottom = min(lowest(scenario, left - margin, right + margin), bottom if not scenario.ground.level else 0.0)
     return float(left - margin), float(right + margin), float(bottom - margin), float(high + margin)
 
 
@@ -168,24 +169,22 @@ def draw_points(
     return discs
 
 
-def draw_surroundings(panel: Axes, scenario: Scenario, frame: Snapshot, limits: Window) -> None:
-    """Ground, barrier where it stands and, dotted, where it stood; and the panel's limits."""
+def draw_surroundings(
+    panel: Axes, scenario: Scenario, frame: Snapshot, limits: Window, moved: Mapping[str, float] | None = None
+) -> None:
+    """Ground, barriers where they stand and, dotted, where they stood, and an inflow's section; the panel's limits.
+
+    Args:
+        panel: to draw on.
+        scenario: of the run.
+        frame: of which the first barrier's displacement is taken where `moved` is not given.
+        limits: of the panel.
+        moved: displacements of the barriers by name [m], from `Results.barrier_displacements`.
+    """
     left, right, bottom, high = limits
     panel.set(xlim=(left, right), ylim=(bottom, high), aspect="equal")
-    if scenario.ground is not None:
-        panel.axhspan(bottom, 0.0, color=GROUND, linewidth=0.0)
-        panel.axhline(0.0, color=GREY, linewidth=0.8)
-    if scenario.barrier is None:
-        return
-    shift = frame.barrier_displacement or 0.0
-    if isinstance(scenario.barrier.shape, Trapezoid):
-        now, start = _moved(scenario.barrier.shape, shift), scenario.barrier.shape.polygon
-        panel.add_patch(PolygonPatch(now, facecolor=BARRIER, edgecolor=EDGE, linewidth=0.8))
-        if abs(shift) > 0.002 * (right - left):
-            panel.add_patch(PolygonPatch(start, fill=False, edgecolor=GREY, linewidth=0.8, linestyle=":"))
-    else:
-        panel.add_patch(Rectangle((shift, 0.0), right - shift, high, facecolor=BARRIER, edgecolor=EDGE))
-
-
-def _moved(shape: Trapezoid, displacement: float) -> np.ndarray:
-    return shape.polygon + np.array([displacement, 0.0])
+    draw_ground(panel, scenario, left, right, bottom)
+    shown = {"barrier": frame.barrier_displacement or 0.0} if moved is None else moved
+    draw_barriers(panel, scenario, shown, right, high)
+    if scenario.flow.inflow is not None:
+        draw_section(panel, scenario.flow.inflow, linewidth=0.8, linestyle=":")

@@ -16,7 +16,7 @@ from collections.abc import Collection
 from typing import Any
 
 from .quantity import Quantity, Sampled
-from .time_series import NAMED, OWN, TIME_SERIES, force_of_surface, quantity_of_column
+from .time_series import NAMED, OWN, TIME_SERIES, force_of_surface, further_quantities, quantity_of_column
 
 __all__ = [
     "NAMED",
@@ -24,6 +24,7 @@ __all__ = [
     "Quantity",
     "Sampled",
     "force_of_surface",
+    "further_quantities",
     "quantities_of",
     "quantity_of_column",
     "recorded_quantities",
@@ -69,15 +70,19 @@ def register(quantity: Sampled) -> None:
 
 def quantities_of(scenario: Any) -> list[str]:
     """Keys of the quantities that a scene has, in their order, whether they are recorded or not."""
-    return [key for key, one in (*TIME_SERIES.items(), *OWN.items()) if one.there(scenario)]
+    known = (*TIME_SERIES.items(), *further_quantities(scenario).items(), *OWN.items())
+    return [key for key, one in known if one.there(scenario)]
 
 
 def recorded_quantities(scenario: Any) -> list[str]:
-    """Keys of those that its time series has: all, or the time, what `output.quantities` names, and what a script
-    registered."""
+    """Keys of those that its time series has: all, or the time, what `output.quantities` names, what is told of further
+    barriers, and what a script registered."""
     chosen: Collection[str] | None = scenario.output.quantities
     keys = quantities_of(scenario)
-    return keys if chosen is None else [key for key in keys if key in OWN or key == "time" or _name(key) in chosen]
+    if chosen is None:
+        return keys
+    always = {"time", *further_quantities(scenario), *OWN}
+    return [key for key in keys if key in always or _name(key) in chosen]
 
 
 def left_out(scenario: Any) -> set[str]:

@@ -169,9 +169,14 @@ _ROWS = (
         "volume overtopped", short="beyond",
     ),
     Figure(
+        "inflow_volume", "m3/m", "what has arrived at the section of the inflow until the end, at the flow's density",
+        "volume that has arrived", short="arrived", needs=("inflow_mass",),
+    ),
+    Figure("deposited_volume", "m3/m", "what lay there at the start as a deposit", "volume deposited before"),
+    Figure(
         "mass_error", "-",
         "greatest change of the mass of both phases, inside and departed together, over the initial mass",
-        "error of mass", needs=("solid_mass", "liquid_mass", "left_mass"),
+        "error of mass", needs=("solid_mass", "liquid_mass", "left_mass", "inflow_mass"),
     ),
     Figure(
         "momentum_error", "-",
@@ -190,8 +195,14 @@ _ROWS = (
         "energy created",
         needs=(
             *("flow_kinetic_energy", "flow_gravitational_energy", "flow_elastic_energy"),
-            *("left_energy", "barrier_work", "seepage_work"),
+            *("left_energy", "barrier_work", "seepage_work", "inflow_energy"),
         ),
+    ),
+    Figure(
+        "barriers", "-",
+        "of a scene with further barriers: a row for each, from upstream to downstream, with the force on the whole of "
+        "it, its motion, the volumes held before and passed beyond its crest at the end, and how far from its heel the "
+        "first of what passed was on the ground (docs/how_to/site.md)",
     ),
     Figure("wall_time", "s", "wall time of the run, its preparation left out", "wall time"),
 )  # fmt: skip

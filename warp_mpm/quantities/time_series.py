@@ -39,9 +39,14 @@ def two_phases(scenario: Any) -> bool:
     return scenario.flow.formulation == "two_phase"
 
 
+def arriving(scenario: Any) -> bool:
+    """Flows that arrive at a section during the run."""
+    return scenario.flow.inflow is not None
+
+
 def ended_barrier(scenario: Any) -> bool:
     """Scenes whose barrier has a base with two ends."""
-    return barrier(scenario) and scenario.barrier.shape.kind == "trapezoid"
+    return barrier(scenario) and scenario.barrier.shape.kind != "wall"
 
 
 def pressed_by_liquid(scenario: Any) -> bool:
@@ -63,12 +68,13 @@ def _left(entry: str) -> Reader:
 
 
 def _residual(axis: str) -> Reader:
-    """Momentum, less its start and gravity's, plus what left and what the flow gave to the bodies."""
+    """Momentum, less its start, gravity's and an inflow's, plus what left and what the flow gave to the bodies."""
     place = "xy".index(axis)
 
     def read(now: Any) -> float:
         residual = now.ledger(f"momentum_{axis}") - now.initial_momentum[place]
         residual -= now.balance(f"gravity_impulse_{axis}")
+        residual -= now.inflow(f"momentum_{axis}")
         residual += now.left(f"momentum_{axis}")
         return residual + sum(now.impulses[place::2])
 
@@ -81,6 +87,36 @@ def force_of_surface(surface: str, axis: str) -> Sampled:
     words = f"force on {surface} along {axis}"
     name = f"{surface}_force_{axis}"
     return Sampled(name, "N/m", meaning, words, read=_force(surface, axis), of_points=False, mean=True)
+
+
+FURTHER = {
+    "barrier_displacement": ("m", "displacement of the barrier {name} along x", "displacement of {name}"),
+    "barrier_velocity": ("m/s", "velocity of the barrier {name} along x", "velocity of {name}"),
+    "barrier_work": ("J/m", "work done by the flow on the barrier {name} since t = 0", "work done on {name}"),
+}
+"""What is told of each further barrier that moves: unit, meaning, words; its columns are `NAME_barrier_displacement`
+and so on."""
+
+
+def of_further_barrier(name: str, what: str) -> Sampled:
+    """A row of `FURTHER` of the barrier `name`."""
+    unit, meaning, words = (text.format(name=name) for text in FURTHER[what])
+    field = what.removeprefix("barrier_")
+    return Sampled(
+        f"{name}_{what}", unit, meaning, words,
+        read=lambda now: getattr(now.further[name], field), of_points=False,
+    )  # fmt: skip
+
+
+def further_quantities(scenario: Any) -> dict[str, Sampled]:
+    """What a scene tells of its further barriers, by key: force on the whole of each, and how it moves."""
+    found: dict[str, Sampled] = {}
+    for one in getattr(scenario, "barriers", ()):
+        rows = [force_of_surface(one.name, axis) for axis in "xy"]
+        if one.motion.kind != "fixed":
+            rows += [of_further_barrier(one.name, what) for what in FURTHER]
+        found |= {row.key: row for row in rows}
+    return found
 
 
 _ROWS = (
@@ -282,6 +318,28 @@ _ROWS = (
         "energy that left the domain", read=_left("energy"), of_points=False,
     ),
     Sampled(
+        "inflow_mass", "kg/m", "mass of both phases that has arrived at the section of the inflow since t = 0",
+        "mass that has arrived", read=lambda now: now.inflow("solid_mass") + now.inflow("liquid_mass"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_momentum_x", "N s/m",
+        "momentum along x that the inflow has brought since t = 0, with its mass and by its thrust at the section",
+        "horizontal momentum that has arrived", read=lambda now: now.inflow("momentum_x"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_momentum_y", "N s/m",
+        "momentum along y that the inflow has given to the flow since t = 0, through the section",
+        "vertical momentum that has arrived", read=lambda now: now.inflow("momentum_y"), there=arriving,
+        of_points=False,
+    ),
+    Sampled(
+        "inflow_energy", "J/m",
+        "kinetic and potential energy that the inflow has brought since t = 0, and the work of its thrust",
+        "energy that has arrived", read=lambda now: now.inflow("energy"), there=arriving, of_points=False,
+    ),
+    Sampled(
         "time_step", "s", "time step at the end of the interval", "time step",
         read=lambda now: now.time_step, of_points=False,
     ),
@@ -295,12 +353,15 @@ NAMED: Mapping[str, Sampled] = {row.name: row for row in _ROWS}
 
 
 def quantity_of_column(name: str) -> Quantity | None:
-    """Of a column of `timeseries.csv` by its name: of the table, of a script, or a force on a surface of its bodies;
-    None where there is no such column."""
+    """Of a column of `timeseries.csv` by its name: of the table, of a script, of a further barrier, or a force on a
+    surface of its bodies; None where there is no such column."""
     if name in NAMED:
         return NAMED[name]
     if name in OWN:
         return OWN[name]
+    for what in FURTHER:
+        if name.endswith(f"_{what}"):
+            return of_further_barrier(name.removesuffix(f"_{what}"), what)
     surface, _, axis = name.rpartition("_force_")
     return force_of_surface(surface, axis) if surface and axis in ("x", "y") else None
 

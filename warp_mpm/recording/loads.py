@@ -123,7 +123,7 @@ class LoadsRecorder:
         _dataset(file, "time", (room,)).attrs["unit"] = "s"
         for stretch in simulation.slots.stretches:
             group = file.create_group(stretch.surface)
-            x, y = (stretch.begin[:, None] + stretch.along[:, None] * stretch.edges)[:2]
+            x, y = stretch.place(stretch.edges).T
             for name, values in (("edges", stretch.edges), ("place", x), ("height", y)):
                 group[name] = values
                 group[name].attrs["unit"] = "m"

@@ -134,7 +134,8 @@ class SnapshotRecorder:
         points = dict(simulation.points())
         position = np.asarray(points.pop("position"))
         if self._count == 0:
-            self._lay_out(len(position), {name: np.asarray(values) for name, values in points.items()})
+            most = max(len(position), getattr(simulation, "material_points", 0))  # more may arrive
+            self._lay_out(most, {name: np.asarray(values) for name, values in points.items()})
         assert self._file is not None
         filled = self._filled
         number, begin, step = len(position), self._points, self._count

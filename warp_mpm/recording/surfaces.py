@@ -1,11 +1,12 @@
-"""Barrier and ground as polygons in a VTKHDF file, beside the material points of the snapshots in ParaView.
+"""Barriers and ground as polygons in a VTKHDF file, beside the material points of the snapshots in ParaView.
 
-The file has the snapshots' times, so that both play together. The cell array `part` tells ground (0) from barrier (1).
+The file has the snapshots' times, so that both play together. The cell array `part` tells ground (0) from the barriers
+(1 and on, from upstream to downstream).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import h5py
@@ -13,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.recording.run_folder import ASIDE
-from warp_mpm.scenario import Scenario, Trapezoid
+from warp_mpm.scenario import Scenario
+from warp_mpm.scenario.site import all_standing
 
 VTK_POLYGON = 7
 GROUND, BARRIER = 0, 1
@@ -21,34 +23,44 @@ GROUND, BARRIER = 0, 1
 Outline = NDArray[np.float64]
 
 
-def outlines(scenario: Scenario, extent: tuple[float, float, float]) -> list[tuple[int, Outline]]:
-    """Part and corners [V, 2] of each surface before the barrier moves.
+def outlines(scenario: Scenario, extent: tuple[float, float, float]) -> list[tuple[int, str, Outline]]:
+    """Part, name and corners [V, 2] of each surface before the barriers move.
 
     Args:
         scenario: of the run.
         extent: left, right and top [m] of what the material reaches, beyond which nothing needs to be shown.
     """
     left, right, top = extent
-    shape = scenario.barrier.shape if scenario.barrier is not None else None
-    if isinstance(shape, Trapezoid):
-        right, top = max(right, 1.2 * shape.base_crest_height[0]), max(top, shape.base_crest_height[2])
-    elif shape is not None:
-        right = max(right, 0.0) + 0.1 * (max(right, 0.0) - left)
-    found = []
-    if scenario.ground is not None:
+    barriers = all_standing(scenario)
+    for _, x, _, standing in barriers:
+        if standing is not None:
+            base = float(standing[:, 0].max()) - x
+            right, top = max(right, x + 1.2 * base), max(top, float(standing[:, 1].max()))
+        else:
+            right = max(right, x) + 0.1 * (max(right, x) - left)
+    found: list[tuple[int, str, Outline]] = []
+    ground = scenario.ground
+    if ground is not None and ground.level:
         depth = 0.04 * (right - left)
-        found.append((GROUND, np.array([[left, -depth], [right, -depth], [right, 0.0], [left, 0.0]])))
-    if isinstance(shape, Trapezoid):
-        found.append((BARRIER, shape.polygon))
-    elif shape is not None:
-        found.append((BARRIER, np.array([[0.0, 0.0], [right, 0.0], [right, top], [0.0, top]])))
+        found.append((GROUND, "ground", np.array([[left, -depth], [right, -depth], [right, 0.0], [left, 0.0]])))
+    elif ground is not None:
+        inside = ground.profile[(ground.profile[:, 0] > left) & (ground.profile[:, 0] < right)]
+        ends = [[x, float(ground.height(x))] for x in (right, left)]
+        line = np.concatenate([ends[:1], inside[::-1], ends[1:]])
+        below = float(line[:, 1].min()) - 0.04 * (right - left)
+        found.append((GROUND, "ground", np.concatenate([[[left, below], [right, below]], line])))
+    for number, (name, x, _, standing) in enumerate(barriers, start=BARRIER):
+        if standing is None:
+            foot = 0.0 if ground is None else float(ground.height(x))
+            standing = np.array([[x, foot], [right, foot], [right, top], [x, top]])
+        found.append((number, name, standing))
     return found
 
 
 def write_surfaces(
     scenario: Scenario,
     times: Sequence[float],
-    displacements: Sequence[float | None],
+    displacements: Sequence[Mapping[str, float]],
     extent: tuple[float, float, float],
     target: Path,
 ) -> bool:
@@ -57,7 +69,7 @@ def write_surfaces(
     Args:
         scenario: of the run.
         times: [s].
-        displacements: of the barrier at these times [m]; None without one.
+        displacements: of the barriers at these times, by name [m].
         extent: see `outlines`.
         target: the file; one that is there is replaced.
     """
@@ -65,13 +77,13 @@ def write_surfaces(
     if not parts or len(times) == 0:
         target.unlink(missing_ok=True)
         return False
-    corners = np.concatenate([outline for _, outline in parts])
-    moves = np.concatenate([np.full(len(outline), part == BARRIER) for part, outline in parts])
+    corners = np.concatenate([outline for _, _, outline in parts])
     steps, cells, points = len(times), len(parts), len(corners)
     positions = np.zeros((steps, points, 3), dtype=np.float32)
     positions[:, :, :2] = corners
-    positions[:, :, 0] += np.array([shift or 0.0 for shift in displacements])[:, None] * moves
-    offsets = np.concatenate([[0], np.cumsum([len(outline) for _, outline in parts])])
+    offsets = np.concatenate([[0], np.cumsum([len(outline) for _, _, outline in parts])])
+    for (_, name, _), first, last in zip(parts, offsets, offsets[1:], strict=False):
+        positions[:, first:last, 0] += np.array([moved.get(name, 0.0) for moved in displacements])[:, None]
     every = np.arange(steps)
 
     aside = target.with_name(target.name + ASIDE)
@@ -86,8 +98,8 @@ def write_surfaces(
         root["Types"] = np.full(steps * cells, VTK_POLYGON, dtype=np.uint8)
         for name, number in (("Points", points), ("Cells", cells), ("ConnectivityIds", points)):
             root[f"NumberOf{name}"] = np.full(steps, number, dtype=np.int64)
-        root["CellData/part"] = np.tile([part for part, _ in parts], steps).astype(np.int32)
-        root["CellData/part"].attrs["meaning"] = "0 ground, 1 barrier"
+        root["CellData/part"] = np.tile([part for part, _, _ in parts], steps).astype(np.int32)
+        root["CellData/part"].attrs["meaning"] = ", ".join(f"{part} {name}" for part, name, _ in parts)
         group = root.create_group("Steps")
         group.attrs["NSteps"] = steps
         group["Values"] = np.asarray(times, dtype=np.float64)

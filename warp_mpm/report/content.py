@@ -19,7 +19,7 @@ from warp_mpm.quantities import Quantity, Sampled
 from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
-from warp_mpm.scenario import Trapezoid, Wall
+from warp_mpm.scenario.site import all_standing
 from warp_mpm.terminal import summary_rows
 
 Array = NDArray[np.float64]
@@ -82,8 +82,8 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "versions": _versions(record),
         "warnings": [*_unfinished(results), *scene_caveats(scenario), *run_caveats(record, results.summary), *no_fit],
         "notes": list(scenario.notes),
-        "ground": scenario.ground is not None,
-        "barrier": _outline(results),
+        "ground": _ground(results),
+        "barriers": _barriers(results),
     }
 
 
@@ -124,10 +124,14 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     energy = NAMED["flow_kinetic_energy"]
     column("solid_mass", "start")
     column("liquid_mass", "start")
+    if "inflow_mass" in series:
+        column("inflow_mass")
     column("left_mass")
     figure("mass_error", ", relative")
     column("momentum_x", "start")
     column("momentum_x", "end")
+    if "inflow_momentum_x" in series:
+        column("inflow_momentum_x")
     figure("impulse", " on the impacted face")
     figure("momentum_error", ", relative")
     first, last = total(0), total(-1)
@@ -136,10 +140,12 @@ def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tupl
     column("barrier_work")
     column("base_friction_work", label="  of it taken by base friction")
     column("seepage_work")
+    if "inflow_energy" in series:
+        column("inflow_energy")
     column("left_energy")
     if first is not None and last is not None:
         spent = first - last - (at("barrier_work", -1) or 0.0) - (at("left_energy", -1) or 0.0)
-        spent += at("seepage_work", -1) or 0.0
+        spent += (at("seepage_work", -1) or 0.0) + (at("inflow_energy", -1) or 0.0)
         row("dissipated in the flow", spent, energy)
     figure("energy_error", ", relative")
     return rows
@@ -237,14 +243,22 @@ def _line(time: Array, values: Array, label: str, colour: int, style: str) -> di
     }
 
 
-def _outline(results: Results) -> dict[str, Any] | None:
-    barrier = results.scenario.barrier
-    if barrier is None:
-        return None
-    if isinstance(barrier.shape, Wall):
-        return {"kind": "wall"}
-    assert isinstance(barrier.shape, Trapezoid)
-    return {"kind": "polygon", "corners": barrier.shape.polygon.tolist()}
+def _ground(results: Results) -> list[list[float]] | None:
+    """Points of the ground's surface, which goes on straight beyond them."""
+    ground = results.scenario.ground
+    return None if ground is None else ground.profile.tolist()
+
+
+def _barriers(results: Results) -> list[dict[str, Any]]:
+    """Outline of each barrier, from upstream to downstream; of a wall without end its foot."""
+    ground, found = results.scenario.ground, []
+    for name, x, _, standing in all_standing(results.scenario):
+        if standing is None:
+            foot = 0.0 if ground is None else float(ground.height(x))
+            found.append({"name": name, "kind": "wall", "corners": [[x, foot]]})
+        else:
+            found.append({"name": name, "kind": "polygon", "corners": standing.tolist()})
+    return found
 
 
 def _versions(record: Mapping[str, Any]) -> dict[str, str]:

@@ -49,7 +49,8 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
     for frame in frames:
         snapshot = snapshots[frame]
         times_kept.append(snapshot.time)
-        shifts.append(snapshot.barrier_displacement)
+        moved = results.barrier_displacements(snapshot)
+        shifts.append([moved.get(name, 0.0) for name, _, _ in results.scenario.all_barriers])
         columns = [*snapshot.position.T, *(field_values(snapshot, field.name, solid_density) for field in fields)]
         for column, values in zip(quantities, columns, strict=True):
             assert values is not None

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from warp_mpm import geometry
-from warp_mpm.schema import Density, Friction, Length, Model, Positive, Series, Velocity
+from warp_mpm.schema import Coordinate, Density, Friction, Length, Model, Point, Positive, Series, Velocity
 
 BASE_STRENGTH_RATIO = 0.8
 """Share of the base soil's tan φ that resists sliding at the barrier's base (paper, §2.2)."""
@@ -78,6 +79,81 @@ class Trapezoid(Model):
     def polygon(self) -> geometry.Polygon:
         """Vertices [4, 2] in metres at t = 0: toe, upstream crest, downstream crest, heel."""
         return geometry.trapezoid(*self.base_crest_height)
+
+    @property
+    def outline(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres from the toe over the crest to the heel."""
+        return self.polygon
+
+    @property
+    def crest_corners(self) -> tuple[int, int]:
+        """Where in the outline the crest begins and ends."""
+        return 1, 2
+
+
+class OutlineShape(Trapezoid):
+    """Any outline: unsymmetric, stepped, curved, with a lip at its crest. Its base joins the heel to the toe; what is
+    hollow beneath counts as filled.
+
+    The crest is what lies between the first and the last of the highest vertices; the face comes before, the back after
+    it. Heights are measured above the toe. To whoever asks for toe, crest and heel alone it is a trapezoid.
+    """
+
+    kind: Literal["outline"]  # type: ignore[assignment]
+    base_width_m: ClassVar[None] = None  # type: ignore[misc]
+    crest_width_m: ClassVar[None] = None  # type: ignore[misc]
+    height_m: ClassVar[None] = None  # type: ignore[misc]
+    face_angle_deg: ClassVar[None] = None  # type: ignore[misc]
+    vertices_m: Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=500)]
+    """Corners [x, y] from the toe, [0, 0], over the crest to the heel, which lies on the ground or below it."""
+
+    @model_validator(mode="after")
+    def _closed(self) -> Self:
+        corners = self.outline
+        if corners[0].any():
+            raise ValueError(
+                f"vertices_m begin at [{corners[0, 0]:g}, {corners[0, 1]:g}]; they must begin at the toe, [0, 0]"
+            )
+        crossing = geometry.crossing_edges(corners)
+        if crossing is not None:
+            raise ValueError(
+                f"vertices_m must not cross or touch themselves; the side after corner {crossing[0] + 1} meets "
+                f"the side after corner {crossing[1] + 1}"
+            )
+        base, _, height = self.base_crest_height
+        if not (geometry.signed_area(corners) < 0.0 and base > 0.0 and height > 0.0):
+            raise ValueError("vertices_m must go from the toe over the crest to a heel downstream and enclose an area")
+        return self
+
+    @property
+    def outline(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres from the toe over the crest to the heel."""
+        return np.array(self.vertices_m)
+
+    @property
+    def crest_corners(self) -> tuple[int, int]:
+        """Where in the outline the crest begins and ends; the same vertex where it has no width."""
+        y = self.outline[:, 1]
+        highest = np.flatnonzero(y >= y.max() * (1.0 - 1e-9))
+        return int(highest[0]), int(highest[-1])
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Toe, upstream crest, downstream crest, heel [4, 2] in metres, as of a trapezoid; what lies between is in
+        `outline`."""
+        first, last = self.crest_corners
+        return self.outline[[0, first, last, -1]]
+
+    @property
+    def base_crest_height(self) -> tuple[float, float, float]:
+        """Widths of base and crest, and height of the crest above the toe [m]."""
+        _, first, last, heel = self.polygon
+        return float(heel[0]), float(last[0] - first[0]), float(first[1])
+
+    @property
+    def built_face_angle_deg(self) -> float:
+        """Angle [°] of the straight line from the toe to the upstream end of the crest."""
+        return math.degrees(math.atan2(self.polygon[1, 1], self.polygon[1, 0]))
 
 
 class Wall(Model):
@@ -164,7 +240,7 @@ def _or_one_friction(schema: dict[str, Any]) -> None:
 class Barrier(Model):
     """A rigid, impermeable barrier on the ground."""
 
-    shape: Annotated[Trapezoid | Wall, Field(discriminator="kind")]
+    shape: Annotated[Trapezoid | OutlineShape | Wall, Field(discriminator="kind")]
     motion: Annotated[Fixed | Sliding | Prescribed, Field(discriminator="kind")]
     friction: Annotated[SurfaceFriction, Field(json_schema_extra=_or_one_friction)]
     """Friction coefficient tan δ against the flow; one number holds for all surfaces."""
@@ -194,9 +270,9 @@ class Barrier(Model):
             return None
         if self.motion.mass_kg_per_m is not None:
             return self.motion.mass_kg_per_m
-        assert isinstance(self.shape, Trapezoid)
+        assert not isinstance(self.shape, Wall)
         assert self.motion.density_kg_per_m3 is not None
-        return self.motion.density_kg_per_m3 * geometry.area(self.shape.polygon)
+        return self.motion.density_kg_per_m3 * geometry.area(self.shape.outline)
 
     @property
     def density(self) -> float | None:
@@ -206,4 +282,30 @@ class Barrier(Model):
         if self.motion.density_kg_per_m3 is not None:
             return self.motion.density_kg_per_m3
         assert self.motion.mass_kg_per_m is not None
-        return self.motion.mass_kg_per_m / geometry.area(self.shape.polygon)
+        return self.motion.mass_kg_per_m / geometry.area(self.shape.outline)
+
+
+RESERVED = (
+    *("barrier", "ground", "impact", "top", "back", "left_wall", "right_wall", "ceiling"),
+    *("base", "flow", "left", "inflow"),
+)
+"""Names that columns and bodies have already."""
+
+
+class FurtherBarrier(Barrier):
+    """A barrier beside the scene's first one, with forces and motion of its own."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=30)]
+    """In the columns of the time series, NAME_force_x and its like: small letters, digits and _."""
+    x_m: Coordinate
+    """x of its toe, or of a wall's face; it stands on the ground there."""
+
+    @field_validator("name")
+    @classmethod
+    def _own_name(cls, name: str) -> str:
+        if name in RESERVED or name.endswith(("_face", "_top", "_back", "_force")):
+            raise ValueError(
+                f"{json.dumps(name)} is not allowed; it must be none of {', '.join(RESERVED)} and not end in _face, "
+                "_top, _back or _force"
+            )
+        return name

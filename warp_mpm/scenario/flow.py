@@ -13,8 +13,22 @@ import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
+from warp_mpm.scenario.ground import Ground
+from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
-from warp_mpm.schema import AsWhole, Density, Length, Model, NonNegative, Point, Positive, Velocity, set_fields
+from warp_mpm.scenario_errors import ScenarioError
+from warp_mpm.schema import (
+    AsWhole,
+    Coordinate,
+    Density,
+    Length,
+    Model,
+    NonNegative,
+    Point,
+    Positive,
+    Velocity,
+    set_fields,
+)
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
 
 NARROWEST = 1e-6
@@ -93,6 +107,70 @@ class FlowPolygon(Model):
     def polygon(self) -> geometry.Polygon:
         """Vertices [V, 2] in metres."""
         return np.array(self.vertices_m)
+
+
+class FlowOnGround(Model):
+    """What lies on the ground, whatever its profile: made into a polygon when the scenario is read."""
+
+    kind: Literal["on_ground"]
+    from_m: Coordinate
+    """x of its tail."""
+    to_m: Coordinate
+    """x of its front."""
+    depth_m: Length
+    """Upright depth between tail and front."""
+    tail_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth grows from nothing at the tail; 0: an upright end."""
+    front_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    """Length over which the depth goes down to nothing at the front."""
+
+    @model_validator(mode="after")
+    def _long_enough(self) -> Self:
+        if not self.to_m - self.from_m >= max(self.tail_m + self.front_m, NARROWEST):
+            raise ValueError(
+                f"to_m = {self.to_m:g} must be at least {max(self.tail_m + self.front_m, NARROWEST):g} m, tail_m and "
+                f"front_m, beyond from_m = {self.from_m:g}"
+            )
+        return self
+
+    @property
+    def polygon(self) -> geometry.Polygon:
+        """Vertices [V, 2] in metres on level ground."""
+        return self.over(Ground()).polygon
+
+    def over(self, ground: Ground) -> FlowPolygon:
+        """Its outline over `ground`, anticlockwise from the tail."""
+        x = ground.profile[:, 0]
+        ends = [[place, float(ground.height(place))] for place in (self.from_m, self.to_m)]
+        lower = np.concatenate([ends[:1], ground.profile[(x > self.from_m) & (x < self.to_m)], ends[1:]])
+        top = np.unique([*lower[:, 0], self.from_m + self.tail_m, self.to_m - self.front_m])
+        depth = np.full(len(top), self.depth_m)
+        if self.tail_m:
+            depth *= np.clip((top - self.from_m) / self.tail_m, 0.0, 1.0)
+        if self.front_m:
+            depth *= np.clip((self.to_m - top) / self.front_m, 0.0, 1.0)
+        upper = np.stack([top, ground.height(top) + depth], axis=1)
+        outline = np.concatenate([lower, upper[depth > 0.0][::-1]])
+        return FlowPolygon(kind="polygon", vertices_m=outline.tolist())
+
+
+class Deposit(Model):
+    """What lies there at the start: the deposit of an earlier surge."""
+
+    shape: Annotated[FlowPolygon | FlowOnGround, Field(discriminator="kind")]
+    """Its outline."""
+    lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow, or of the law
+    where it has a `material`."""
+    material: dict[str, float] | None = None
+    """What its skeleton has otherwise than flow.material: young_modulus_Pa, poisson_ratio and fields of the law; null:
+    nothing."""
+
+    def laid_on(self, ground: Ground) -> Self:
+        """The same deposit as a polygon over `ground`, where it is of the kind on_ground."""
+        if not isinstance(self.shape, FlowOnGround):
+            return self
+        return self.model_copy(update={"shape": self.shape.over(ground)})
 
 
 class Skeleton(Model):
@@ -216,10 +294,14 @@ class TwoPhaseMaterial(UndrainedMaterial):
 
 
 class _FlowBase(Model):
-    shape: Annotated[FrontAndTail | FlowPolygon, Field(discriminator="kind")]
-    """Outline at t = 0."""
-    velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)]
-    """Uniform velocity [x, y] at t = 0, of both phases."""
+    shape: Annotated[FrontAndTail | FlowPolygon | FlowOnGround, Field(discriminator="kind")] | None = None
+    """Outline at t = 0; null of a flow that only arrives (`inflow`)."""
+    velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)] = (0.0, 0.0)
+    """Uniform velocity [x, y] at t = 0, of both phases; it must be given with a shape."""
+    inflow: Inflow | None = None
+    """What arrives at a section during the run; null: nothing does."""
+    deposits: Annotated[tuple[Deposit, ...], Field(strict=False, max_length=100)] = ()
+    """What lies still at the start."""
     initial_stress: Literal["geostatic", "zero"] = "geostatic"
     """geostatic: liquid pressure hydrostatic and effective stress from the weight, along each vertical; zero: none."""
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
@@ -238,10 +320,80 @@ class _FlowBase(Model):
             return data | {"material": {"law": DEFAULT} | data["material"]}
         return data
 
+    @model_validator(mode="after")
+    def _something_flows(self) -> Self:
+        if self.shape is None and self.inflow is None:
+            raise ValueError("shape is missing; it must be given, unless there is an inflow")
+        if self.shape is not None and "velocity_m_per_s" not in self.model_fields_set:
+            raise ValueError("velocity_m_per_s is missing; it must be given with a shape, as a list of 2 numbers")
+        if self.shape is None and self.velocity_m_per_s != (0.0, 0.0):
+            raise ValueError(
+                f"velocity_m_per_s = {list(self.velocity_m_per_s)} is that of a shape, which is not given; the "
+                "velocities of what arrives stand in inflow"
+            )
+        return self
+
+    def laid_on(self, ground: Ground) -> Self:
+        """The same flow over `ground`: what lies on it as a polygon, and the section of what arrives at its height."""
+        changes: dict[str, Any] = {}
+        if isinstance(self.shape, FlowOnGround):
+            changes["shape"] = self.shape.over(ground)
+        if any(isinstance(deposit.shape, FlowOnGround) for deposit in self.deposits):
+            changes["deposits"] = tuple(deposit.laid_on(ground) for deposit in self.deposits)
+        if self.inflow is not None:
+            changes["inflow"] = self.inflow.laid_on(ground)
+        return self.model_copy(update=changes) if changes else self
+
+    @property
+    def bodies(self) -> list[tuple[str, geometry.Polygon]]:
+        """Field and outline [V, 2] [m] of everything that is there at t = 0."""
+        found = [("flow.shape", self.shape.polygon)] if self.shape is not None else []
+        return found + [(f"flow.deposits[{k}]", deposit.shape.polygon) for k, deposit in enumerate(self.deposits)]
+
+    @model_validator(mode="after")
+    def _other_materials(self) -> Self:
+        known = ("young_modulus_Pa", "poisson_ratio", *LAWS.named(self.material.law).Settings.model_fields)
+        for place, deposit in enumerate(self.deposits):
+            name = f"deposits[{place}].material"
+            for field in deposit.material or {}:
+                if field not in known:
+                    raise ValueError(f"{name}.{field} is not allowed; a deposit may differ in {', '.join(known)}")
+            try:
+                self.material_of(deposit)
+            except ScenarioError as error:
+                raise ValueError(f"{name}: {error.problems[0].rstrip('.')}") from None
+        return self
+
+    def material_of(self, deposit: Deposit) -> Skeleton:
+        """The material of a deposit: the flow's, but for what its own says."""
+        if not deposit.material:
+            return self.material
+        return type(self.material).model_validate(self.material.model_dump() | deposit.material)
+
+    @property
+    def materials(self) -> list[Skeleton]:
+        """All of the scene's, the flow's first, then those that are its deposits' own."""
+        return [self.material, *(self.material_of(deposit) for deposit in self.deposits if deposit.material)]
+
     @property
     def polygon(self) -> geometry.Polygon:
-        """Outline at t = 0, vertices [V, 2] in metres."""
-        return self.shape.polygon
+        """Outline at t = 0, vertices [V, 2] in metres; of a flow that only arrives the box of its volume and depth that
+        ends at the section."""
+        if self.shape is not None:
+            return self.shape.polygon
+        assert self.inflow is not None
+        right, low, depth = self.inflow.x_m, self.inflow.base, self.inflow.greatest_depth
+        left = right - self.inflow.volume / depth
+        return np.array([[left, low], [right, low], [right, low + depth], [left, low + depth]])
+
+    @property
+    def outlines(self) -> list[geometry.Polygon]:
+        """All that is there at t = 0, vertices [V, 2] each [m], and of what arrives the section [2, 2]."""
+        found = [outline for _, outline in self.bodies]
+        if self.inflow is not None:
+            x, low = self.inflow.x_m, self.inflow.base
+            found.append(np.array([[x, low], [x, low + self.inflow.greatest_depth]]))
+        return found
 
     @property
     def lateral_stress_ratio(self) -> float:
@@ -252,13 +404,23 @@ class _FlowBase(Model):
 
     @property
     def volume(self) -> float:
-        """Volume V_1 [m³/m]."""
-        return geometry.area(self.polygon)
+        """Volume V_1 [m³/m] of all that flows, what arrives during the run included."""
+        there = geometry.area(self.shape.polygon) if self.shape is not None else 0.0
+        return there + self.inflow.volume if self.inflow is not None else there
+
+    @property
+    def deposited_volume(self) -> float:
+        """Volume of the deposits [m³/m]."""
+        return sum(geometry.area(deposit.shape.polygon) for deposit in self.deposits)
 
     @property
     def depth(self) -> float:
-        """Flow depth h [m]: the greatest vertical thickness of the outline."""
-        return self.shape.depth_m if isinstance(self.shape, FrontAndTail) else geometry.maximum_depth(self.polygon)
+        """Flow depth h [m]: the greatest vertical thickness of the outline and of what arrives."""
+        if isinstance(self.shape, FrontAndTail):
+            there = self.shape.depth_m
+        else:
+            there = geometry.maximum_depth(self.shape.polygon) if self.shape is not None else 0.0
+        return max(there, self.inflow.greatest_depth) if self.inflow is not None else there
 
     @property
     def equivalent_length(self) -> float:
@@ -267,8 +429,9 @@ class _FlowBase(Model):
 
     @property
     def speed(self) -> float:
-        """Magnitude of the initial velocity [m/s]."""
-        return math.hypot(*self.velocity_m_per_s)
+        """Magnitude of the initial velocity [m/s], or of the greatest that arrives."""
+        speed = math.hypot(*self.velocity_m_per_s)
+        return max(speed, self.inflow.greatest_speed) if self.inflow is not None else speed
 
 
 class TwoPhaseFlow(_FlowBase):

@@ -9,13 +9,15 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from warp_mpm.scenario.barrier import Barrier
+from warp_mpm.scenario.barrier import Barrier, FurtherBarrier
 from warp_mpm.scenario.checks import problems
 from warp_mpm.scenario.design import Design
 from warp_mpm.scenario.flow import Flow, offer_laws
-from warp_mpm.scenario.settings import Domain, Gravity, Ground, Numerics, Output, offer_schemes
+from warp_mpm.scenario.ground import Ground
+from warp_mpm.scenario.settings import Domain, Gravity, Numerics, Output, offer_schemes
 from warp_mpm.scenario_errors import ScenarioError, read_json
 from warp_mpm.schema import Model, Text, set_fields
+from warp_mpm.tables_beside import with_tables_beside
 
 
 class Scenario(Model):
@@ -34,6 +36,8 @@ class Scenario(Model):
     flow: Annotated[Flow, Field(discriminator="formulation")]
     barrier: Barrier | None = None
     """null: no barrier."""
+    barriers: Annotated[tuple[FurtherBarrier, ...], Field(strict=False, max_length=20)] = ()
+    """Further barriers, each with a name; they neither need `barrier` nor stand in for it."""
     ground: Ground | None = Ground()
     """null: no ground, for instance for a free jet."""
     domain: Domain = Domain()
@@ -49,13 +53,27 @@ class Scenario(Model):
         Raises:
             ScenarioError: the file cannot be read, is no JSON, or says something impossible; one sentence per problem.
         """
-        return cls.model_validate(read_json(Path(path)), source_name=str(path))
+        return cls.model_validate(with_tables_beside(read_json(Path(path)), Path(path).parent), source_name=str(path))
 
     @model_validator(mode="before")
     @classmethod
     def _without_schema_pointer(cls, data: Any) -> Any:
         # "$schema" tells an editor where the JSON Schema lies; it says nothing about the scene.
         return {key: value for key, value in data.items() if key != "$schema"} if isinstance(data, dict) else data
+
+    @property
+    def all_barriers(self) -> list[tuple[str, float, Barrier]]:
+        """Name, x of the toe [m] and barrier of each one, from upstream to downstream."""
+        found: list[tuple[str, float, Barrier]] = [("barrier", 0.0, self.barrier)] if self.barrier is not None else []
+        found += [(one.name, one.x_m, one) for one in self.barriers]
+        return sorted(found, key=lambda one: one[1])
+
+    @property
+    def plain(self) -> bool:
+        """Whether the ground is level or absent, and there is no barrier but a single trapezoid or wall."""
+        level = self.ground is None or self.ground.level
+        shaped = self.barrier is not None and self.barrier.shape.kind == "outline"
+        return level and not self.barriers and not shaped
 
     def resolved(self) -> dict[str, Any]:
         """The scenario as a dict of plain JSON values with every default filled in; loads to an equal Scenario."""
@@ -80,6 +98,7 @@ class Scenario(Model):
 
     @model_validator(mode="after")
     def _scene(self) -> Self:
+        object.__setattr__(self, "flow", self.flow.laid_on(self.ground if self.ground is not None else Ground()))
         found = problems(self)
         if found:
             raise ValueError("\n".join(found))

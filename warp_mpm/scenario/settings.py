@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from warp_mpm.quantities.time_series import NAMED
-from warp_mpm.schema import Coordinate, Friction, Interval, Length, Model, NonNegative, set_fields
+from warp_mpm.schema import Coordinate, Interval, Length, Model, NonNegative, set_fields
 from warp_mpm.simulator.schemes import SCHEMES
 
 STANDARD_GRAVITY = 9.81
@@ -31,13 +31,6 @@ class Gravity(Model):
         return self.acceleration_m_per_s2 * math.sin(tilt), -self.acceleration_m_per_s2 * math.cos(tilt)
 
 
-class Ground(Model):
-    """Rigid, impermeable ground at y = 0."""
-
-    friction: Friction = 0.0
-    """Friction coefficient tan φ_b between the flow's solid and the ground; 0 is smooth, as in the paper."""
-
-
 class Domain(Model):
     """Edges of the region in which the flow is followed. An extent left out is fitted to the scene."""
 
@@ -50,7 +43,7 @@ class Domain(Model):
     right_m: Coordinate | None = None
     """x of the right edge."""
     bottom_m: Coordinate | None = None
-    """y of the lower edge of a scene without ground, which is open; with ground it is the ground, y = 0."""
+    """y of the lower edge of a scene without ground, which is open; with ground it is the ground."""
     top_m: Coordinate | None = None
     """y of the upper edge."""
 

@@ -32,8 +32,14 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
     takes = ("points", "parameters", "book")
+    step.append(Launch("advect", "points", points, "moves the points"))
+    if effects.arriving:
+        arriving = ("points", "grid", "parameters", "arrival", "book")
+        step += [
+            Launch("convey", "one", ("arrival", "book"), "how far what arrives has come"),
+            Launch("hold", "points", arriving, "points on their last cells before the section of an inflow"),
+        ]
     step += [
-        Launch("advect", "points", points, "moves the points"),
         Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
         *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
         Launch("bound", "points", takes, "limits that few points come to"),

@@ -17,6 +17,7 @@ from ..grid import GridLayout
 from ..kernels import layout as at
 from ..scenario import Scenario
 from ..scenario.checks import BYTES_PER_POINT
+from ..scenario.inflow import APPROACH
 from ..simulator.bodies import Body
 from ..simulator.bodies.arrays import Group, filled
 from ..simulator.bodies.room import open_corner_volumes, solid_cells
@@ -49,18 +50,23 @@ def point_arrays(
     initial: MaterialPoints,
     *,
     liquid_bulk_modulus: float,
+    materials: Sequence[Any] = (),
     device: Any,
 ) -> Group:
     """State of the material points at the start; fields that nothing is said of begin at 0."""
     count = len(initial.volume)
     given: dict[str, Any] = {
         "position": initial.position,
-        "velocity": np.tile(np.array(scenario.flow.velocity_m_per_s), (count, types.components // 2)),
+        "velocity": np.tile(initial.velocity, (1, types.components // 2)),
         "stress": initial.effective_stress,
         "reference_volume": initial.volume,
         "volume": initial.volume,
-        "inside": np.ones(count, dtype=np.int32),
+        "inside": np.where(initial.waits, at.WAITING, at.INSIDE).astype(np.int32),
     }
+    if effects.arriving:
+        given["pace"] = initial.pace
+    if effects.materials:
+        given |= {"material": initial.material, "materials": materials}
     if effects.liquid:
         given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
     for owner in (effects.skeleton, effects.scheme):
@@ -69,6 +75,25 @@ def point_arrays(
             shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
             given[name] = np.ascontiguousarray(np.broadcast_to(start, shape))
     return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
+
+
+def arrival_arrays(scenario: Scenario, types: SimpleNamespace, *, device: Any) -> Group:
+    """The table of an inflow, how far it has come, and what it has brought."""
+    inflow = scenario.flow.inflow
+    assert inflow is not None
+    given = {
+        "times": inflow.times,
+        "velocities": inflow.velocities,
+        "ways": inflow.ways,
+        "stretches": inflow.stretches,
+        "section": inflow.x_m,
+        "base": inflow.base,
+        "slope": inflow.slope,
+        "entry": inflow.x_m - APPROACH * scenario.numerics.spacing_m,
+        "fastest": inflow.greatest_speed,
+    }
+    shapes = {"conveyed": at.CONVEYED_SIZE, "inflow": at.INFLOW_SIZE}
+    return filled(types.Arrival(), types.arrival_fields, given, shapes, device)
 
 
 def grid_arrays(
@@ -96,7 +121,8 @@ def clock_arrays(
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.SMALLEST_TIME_STEP] = math.inf
     clock[at.SPEED_MAX] = scenario.flow.speed**2
-    solid, liquid = float(initial.solid_mass.sum()), float(initial.liquid_mass.sum())
+    there = slice(None, initial.there)
+    solid, liquid = float(initial.solid_mass[there].sum()), float(initial.liquid_mass[there].sum())
     if not effects.two_phase:
         solid, liquid = solid + liquid, 0.0
     balance = np.zeros(at.BALANCE_SIZE)

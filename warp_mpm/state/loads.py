@@ -108,7 +108,7 @@ class LoadsNow:
         flow, face = self.scenario.flow, self.slots.face
         least = PRESSED * flow.material.density * self.scenario.gravity.acceleration_m_per_s2 * flow.depth
         reached = np.flatnonzero(self._pressed > least * (face.edges[1] - face.edges[0]))
-        return float(face.heights[reached[-1] + 1]) if reached.size else 0.0
+        return float(np.maximum(face.heights[reached], face.heights[reached + 1]).max()) if reached.size else 0.0
 
     @cached_property
     def pore_pressure_patch(self) -> Patch:
@@ -125,5 +125,5 @@ class LoadsNow:
         if not mean[greatest] > 0.0:
             return Patch()
         face = self.slots.face
-        height = face.begin[1] + face.along[1] * self.patches.middle[greatest]
+        height = face.place(self.patches.middle[greatest : greatest + 1])[0, 1]
         return Patch(float(mean[greatest]), float(height))

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import layout as at
-from ..quantities import TIME_SERIES, Sampled, force_of_surface, quantities_of
+from ..quantities import TIME_SERIES, Sampled, force_of_surface, further_quantities, quantities_of
 from ..quantities.time_series import OWN
 from ..scenario import Scenario
-from ..simulator.bodies import Body, Sliding
+from ..simulator.bodies import Body
 
 
 def _entries(prefix: str) -> dict[str, int]:
@@ -24,7 +24,7 @@ def _entries(prefix: str) -> dict[str, int]:
     return {name.removeprefix(prefix).lower(): place for name, place in vars(at).items() if name.startswith(prefix)}
 
 
-_LEDGER, _LEFT = _entries("LEDGER_"), _entries("LEFT_")
+_LEDGER, _LEFT, _INFLOW = _entries("LEDGER_"), _entries("LEFT_"), _entries("INFLOW_")
 _BALANCE = {name.lower(): place for name, place in vars(at).items() if name.startswith(("GRAVITY_", "SEEPAGE_"))}
 
 
@@ -107,6 +107,8 @@ class Now:
     """All that the flow meets."""
     barrier: BarrierNow
     """Of no matter where there is none."""
+    further: Mapping[str, BarrierNow]
+    """The same of each further barrier, by its name."""
     time: float
     """[s]."""
     time_step: float
@@ -114,7 +116,7 @@ class Now:
     elapsed: float
     """Time over which forces are means [s]."""
     forces: Mapping[str, tuple[float, float]]
-    """Mean force of the flow on each surface along x and y, by its name [N/m]."""
+    """Mean force of the flow on each surface, and on each body of several, along x and y, by its name [N/m]."""
     base_force: float
     """Mean friction at the base of a sliding barrier, against its motion [N/m]."""
     loads: Any
@@ -128,6 +130,7 @@ class Now:
     sums: Sequence[float]
     departed: Sequence[float]
     balanced: Sequence[float]
+    arrived: Sequence[float] = (0.0,) * at.INFLOW_SIZE
 
     def ledger(self, entry: str) -> float:
         """Sum over the material points: `LEDGER_...` of `kernels/layout.py`, in small letters."""
@@ -141,17 +144,22 @@ class Now:
         """What gravity gave to the flow: `GRAVITY_...`, `SEEPAGE_...`."""
         return self.balanced[_BALANCE[entry]]
 
+    def inflow(self, entry: str) -> float:
+        """What an inflow has brought: `INFLOW_...`."""
+        return self.arrived[_INFLOW[entry]]
+
     @property
     def base_normal_force(self) -> float:
         """Mean force with which a sliding barrier presses on its base [N/m]."""
-        barrier = next(body for body in self.bodies if isinstance(body.motion, Sliding))
+        barrier = next(body for body in self.bodies if body.name == "barrier")
         vertical = sum(self.forces[surface.name][1] for surface in barrier.surfaces)
         return max(-self.barrier.mass * self.scenario.gravity.vector[1] - vertical, 0.0)
 
 
 def sampled_quantities(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, Sampled]:
     """What a sample of a scene tells, by key: of the table, of a script, and forces on the surfaces of its bodies."""
-    found = {key: TIME_SERIES.get(key) or OWN[key] for key in quantities_of(scenario)}
+    further = further_quantities(scenario)
+    found = {key: TIME_SERIES.get(key) or further.get(key) or OWN[key] for key in quantities_of(scenario)}
     for body in bodies:
         for surface in body.surfaces:
             for axis in ("x", "y"):
@@ -167,10 +175,15 @@ def wanted_quantities(known: Mapping[str, Sampled], names: Collection[str] | Non
 
 
 def mean_forces(bodies: Sequence[Body], now: Window, since: Window) -> tuple[dict[str, tuple[float, float]], float]:
-    """Mean force [N/m] on each surface by name, and at the base, between two windows: impulse over time."""
+    """Mean force [N/m] on each surface and on each body of several by name, and at the base, between two windows:
+    impulse over time."""
     elapsed = now.time - since.time
     rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
     means = [(after - before) * rate for after, before in zip(now.reactions, since.reactions, strict=True)]
     surfaces = [surface.name for body in bodies for surface in body.surfaces]
     forces = {name: (means[2 * place], means[2 * place + 1]) for place, name in enumerate(surfaces)}
+    for body in bodies:
+        if len(body.surfaces) > 1:
+            x, y = zip(*(forces[surface.name] for surface in body.surfaces), strict=True)
+            forces.setdefault(body.name, (sum(x), sum(y)))
     return forces, -(now.base_impulse - since.base_impulse) * rate

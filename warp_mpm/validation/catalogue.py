@@ -19,6 +19,7 @@ from warp_mpm.validation import (
     refinement,
     rheology,
     shallow_water,
+    sites,
 )
 from warp_mpm.validation.case import Case
 
@@ -31,6 +32,7 @@ CASES: tuple[Case, ...] = (
     *free_motion.CASES,
     *jets.CASES,
     *shallow_water.CASES,
+    *sites.CASES,
     *granular.CASES,
     *rheology.CASES,
     *case_one.CASES,

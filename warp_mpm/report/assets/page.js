@@ -94,14 +94,22 @@ function fillTables() {
   if (runs.length > 1) by("differences").textContent = "Shaded rows differ between the runs.";
 }
 
+function travelOf(run, barrier) {
+  // How far a barrier gets downstream.
+  return Math.max(0, ...run.points.shifts.map(shifts => shifts[barrier] || 0));
+}
+
 function unionWindow() {
   // One window for all runs, so that lengths compare; the barrier and its travel are inside.
   let [left, right, bottom, top] = [Infinity, -Infinity, 0, -Infinity];
   for (const run of runs) {
-    const [a, b, c, d] = run.points.window, travel = Math.max(0, ...run.points.shifts);
+    const [a, b, c, d] = run.points.window;
     left = Math.min(left, a); right = Math.max(right, b); bottom = Math.min(bottom, c); top = Math.max(top, d);
-    if (run.barrier) right = Math.max(right, 2);
-    for (const [x, y] of (run.barrier && run.barrier.corners) || []) { right = Math.max(right, x + travel); top = Math.max(top, y); }
+    run.barriers.forEach((barrier, i) => {
+      if (barrier.kind === "wall") right = Math.max(right, barrier.corners[0][0] + 2);
+      else for (const [x, y] of barrier.corners) { right = Math.max(right, x + travelOf(run, i)); top = Math.max(top, y); }
+    });
+    for (const [x, y] of run.ground || []) if (x > left && x < right) bottom = Math.min(bottom, y);
   }
   const margin = 0.03 * Math.max(right - left, top - bottom);
   return [left - margin, right + margin, bottom - 1.5 * margin, top + margin];
@@ -111,13 +119,14 @@ function nearWindow(whole) {
   // The flow as it starts and the barrier with its travel, and room above for the run-up.
   let [left, right, , top] = [Infinity, -Infinity, 0, -Infinity];
   for (const run of runs) {
-    const travel = Math.max(0, ...run.points.shifts), corners = (run.barrier && run.barrier.corners) || [[0, 0]];
-    left = Math.min(left, run.points.start[0]);
-    right = Math.max(right, run.points.start[1], Math.max(...corners.map(([x]) => x)) + travel);
-    top = Math.max(top, run.points.start[3], Math.max(...corners.map(([, y]) => y)));
+    left = Math.min(left, run.points.start[0]); right = Math.max(right, run.points.start[1], 0);
+    top = Math.max(top, run.points.start[3]);
+    run.barriers.forEach((barrier, i) => {
+      for (const [x, y] of barrier.corners) { right = Math.max(right, x + travelOf(run, i)); top = Math.max(top, y); }
+    });
   }
   const margin = 0.04 * (right - left);
-  return [left - margin, Math.min(right + 4 * margin, whole[1]), whole[2], Math.min(2.4 * top, whole[3])];
+  return [left - margin, Math.min(right + 4 * margin, whole[1]), whole[2], Math.min(top + 1.4 * Math.abs(top), whole[3])];
 }
 
 function fieldOf(name) {
@@ -285,11 +294,11 @@ function drawStills(clouds, home) {
     for (const cloud of clouds) {
       const box = column(row, cloud.run), frame = cloud.frameAt(time), index = cloud.fieldIndex(name);
       const caption = Object.assign(document.createElement("p"), {className: "caption"});
-      const shift = cloud.points.shifts[frame];
+      const moved = cloud.run.barriers.map((barrier, i) => [barrier.name, cloud.points.shifts[frame][i] || 0]).filter(([, shift]) => shift);
       let most = 0;
       if (index >= 0) for (const value of cloud.raw(frame, 2 + index)) most = Math.max(most, cloud.toValue(2 + index, value));
       caption.textContent = `t = ${cloud.points.times[frame].toFixed(2)} s, greatest ${field.label} ` +
-        `${most.toFixed(0)} ${field.unit}` + (shift ? `, barrier moved ${shift.toFixed(2)} m` : "");
+        `${most.toFixed(0)} ${field.unit}` + moved.map(([name, shift]) => `, ${name} moved ${shift.toFixed(2)} m`).join("");
       const canvas = Object.assign(document.createElement("canvas"), {className: "still", role: "img"});
       canvas.setAttribute("aria-label", `${cloud.run.name}: ${caption.textContent}`);
       box.append(caption, canvas);

@@ -102,12 +102,29 @@ function formatTick(value, step) {
   return (Math.abs(value) < step / 2 ? 0 : value).toFixed(digits);
 }
 
-function drawBarrier(pen, view, run, shift, ghost) {
-  const barrier = run.barrier;
-  if (!barrier) return;
+function groundHeight(line, x) {
+  // The surface goes on straight beyond its points.
+  let k = 1;
+  while (k < line.length - 1 && line[k][0] < x) k++;
+  const [[x0, y0], [x1, y1]] = [line[k - 1], line[k]];
+  return x1 === x0 ? y1 : y0 + (x - x0) * (y1 - y0) / (x1 - x0);
+}
+
+function drawGround(pen, view, line) {
+  if (!line) return;
+  const left = view.mx(0), right = view.mx(view.width);
+  const shown = [[left, groundHeight(line, left)], ...line.filter(([x]) => x > left && x < right), [right, groundHeight(line, right)]];
+  const trace = () => shown.forEach(([x, y], i) => (i ? pen.lineTo : pen.moveTo).call(pen, view.px(x), view.py(y)));
+  pen.beginPath(); trace(); pen.lineTo(view.width, view.height + 1e5); pen.lineTo(0, view.height + 1e5); pen.closePath();
+  pen.fillStyle = "#d9d2c5"; pen.fill();
+  pen.beginPath(); trace(); pen.strokeStyle = "#61656b"; pen.lineWidth = 1; pen.stroke();
+}
+
+function drawBarrier(pen, view, barrier, shift, ghost) {
   const trace = offset => {
     pen.beginPath();
-    if (barrier.kind === "wall") pen.rect(view.px(offset), 0, 1e5, view.py(0));
+    const [[x0, y0]] = barrier.corners;
+    if (barrier.kind === "wall") pen.rect(view.px(x0 + offset), view.py(y0) - 1e5, 1e5, 1e5);
     else {
       barrier.corners.forEach(([x, y], i) => (i ? pen.lineTo : pen.moveTo).call(pen, view.px(x + offset), view.py(y)));
       pen.closePath();
@@ -124,11 +141,8 @@ function drawCloud(canvas, view, cloud, frame, field, low, high, colours) {
   const [pen, width, height] = prepareCanvas(canvas, (home[1] - home[0]) / (home[3] - home[2]));
   view.fit(width, height);
   drawAxes(pen, view, false);
-  if (cloud.run.ground) {
-    pen.fillStyle = "#d9d2c5"; pen.fillRect(0, view.py(0), width, height);
-    pen.fillStyle = "#61656b"; pen.fillRect(0, view.py(0), width, 1);
-  }
-  drawBarrier(pen, view, cloud.run, cloud.points.shifts[frame] || 0, true);
+  drawGround(pen, view, cloud.run.ground);
+  cloud.run.barriers.forEach((barrier, i) => drawBarrier(pen, view, barrier, cloud.points.shifts[frame][i] || 0, true));
   const xs = cloud.raw(frame, 0), ys = cloud.raw(frame, 1);
   const [xLow, xHigh] = cloud.points.ranges[0], [yLow, yHigh] = cloud.points.ranges[1];
   const xScale = (xHigh - xLow) / 65535, yScale = (yHigh - yLow) / 65535;

@@ -17,8 +17,9 @@ from warp_mpm.grid import GridLayout
 from warp_mpm.kernels.layout import SLOT_SIZE
 
 from .body import Body, Driven, Sliding
+from .kernels import NEAR
 from .loads import Slots
-from .outline import ENDLESS
+from .outline import ENDLESS, FEW, Segments
 from .places import Places, by_block, coloured, neighbours, places_of, sharing
 
 
@@ -74,6 +75,17 @@ def passes(body: Body, bodies: Sequence[Body]) -> bool:
     return body.moves or (riding >= 0 and bodies[riding].moves and not level)
 
 
+def profiled(bodies: Sequence[Body]) -> int:
+    """Number of the body whose pieces are found by the column of the grid: an open outline of many that rests and leads
+    along x; -1 where there is none."""
+    for number, body in enumerate(bodies):
+        pieces = body.outline.segments
+        along = not pieces.closed and len(pieces) > FEW and bool((pieces.along[:, 0] >= 0.0).all())
+        if along and not passes(body, bodies):
+            return number
+    return -1
+
+
 def effects_of(bodies: Sequence[Body]) -> dict[str, bool]:
     """Those fields of `Effects` that the bodies decide."""
     ground_alone = len(bodies) == 1 and _is_level_ground(bodies[0])
@@ -84,6 +96,7 @@ def effects_of(bodies: Sequence[Body]) -> dict[str, bool]:
         "driven": any(isinstance(body.motion, Driven) for body in bodies),
         "joined": len(bodies) > 0 and not ground_alone,
         "passing": any(passes(body, bodies) for body in bodies),
+        "profile": profiled(bodies) >= 0,
     }
 
 
@@ -116,6 +129,10 @@ def body_arrays(
             "pieces": np.concatenate([piece.numbers for piece in pieces]),
             "hull": np.concatenate([piece.hull for piece in pieces]),
         }
+    if effects.profile:
+        number = profiled(bodies)
+        given["profiled"] = number
+        given["near"] = pieces_by_column(bodies[number].outline.segments, grid) + given["first_piece"][number]
     if effects.friction:
         given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
         given["rubs"] = np.array([body.rubs for body in bodies], dtype=np.int32)
@@ -203,6 +220,16 @@ def contact_arrays(
     shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1, "more": 1}
     shapes |= {"taken": SLOT_SIZE * (len(slots) if slots is not None else 0), "turned": 2 * int(first[-1])}
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
+
+
+def pieces_by_column(pieces: Segments, grid: GridLayout) -> NDArray[np.int32]:
+    """First and last but one of the pieces [columns, 2] within `NEAR` cells of each column of the grid."""
+    left = grid.left + np.arange(grid.columns) * grid.spacing
+    low, high = left - NEAR * grid.spacing, left + (NEAR + 1.0) * grid.spacing
+    start, end = (pieces.begin[:, 0] + limit * pieces.along[:, 0] for limit in (pieces.low, pieces.high))
+    first = np.searchsorted(end, low, side="left")
+    last = np.searchsorted(start, high, side="right")
+    return np.stack([first, np.maximum(last, first + 1)], axis=1).astype(np.int32)
 
 
 def _box(body: Body, bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.float64]:

@@ -16,13 +16,17 @@ that rubs."""
 RUBBED = 3.0
 """Cells from a surface within which points may share a node with it."""
 
+NEAR = 5.0
+"""Cells from a point's column within which it looks at the pieces of a profile: more than `RUBBED` and the cells that a
+point may be deep."""
+
 PIECE = 9
 """Numbers of a piece: begin (x, y), along (x, y), low, high, normal (x, y), offset, as in `outline.Segments`."""
 
 
 def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict[str, Any]:
     """Fields of the structure `Bodies` for `effects`: B bodies, S surfaces, G pieces of their outlines."""
-    array = wp.array
+    array, array2d = wp.array, wp.array2d
     fields: dict[str, Any] = {"count": wp.int32}
     if effects.bodies:
         fields |= {
@@ -37,6 +41,9 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
             # [G] offset of those pieces on whose line's one side the whole body lies, far away of the others.
             "hull": array(dtype=scalar),
         }
+    if effects.profile:
+        fields["profiled"] = wp.int32  # the body whose pieces are found by the column of the grid
+        fields["near"] = array2d(dtype=wp.int32)  # [columns, 2] first and last but one of its pieces about the column
     if effects.friction:
         fields["friction"] = array(dtype=scalar)  # [S]
         fields["rubs"] = array(dtype=wp.int32)  # [B] 1: some surface of the body has friction
@@ -116,7 +123,8 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
 
 
 def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> SimpleNamespace:
-    """Build the functions `nearest`, `normal_of`, `travel`, `displaced`, `in_box`, `in_hull`, `look_ahead`, `set_back`.
+    """Build the functions `nearest`, `normal_of`, `travel`, `displaced`, `in_box`, `in_hull`, `look_ahead`, `about`,
+    `set_back`.
 
     Each array that a kernel might look at costs it a load per thread, whether or not it does: kernels over points name
     few of them, and by `read`.
@@ -129,6 +137,7 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
     Bodies, Grid = types.Bodies, types.Grid
     read = elementary.read
     MOVING = effects.moving
+    PROFILE = effects.profile
     SAME = TIE if effects.precision == "float64" else 1e-6
 
     pieces_of = wp.array(dtype=P)
@@ -219,12 +228,25 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
         )
 
     @wp.func
+    def about(bodies: Bodies, body: wp.int32, column: wp.int32, columns: wp.int32):
+        """First and last but one of a body's pieces that a point in the column looks at."""
+        first = read(bodies.first_piece, body)
+        last = read(bodies.first_piece, body + 1)
+        if PROFILE:
+            if body == bodies.profiled:
+                at = wp.clamp(column, 0, columns - 1)
+                first = bodies.near[at, 0]
+                last = bodies.near[at, 1]
+        return first, last
+
+    @wp.func
     def set_back(pieces: pieces_of, first: wp.int32, last: wp.int32, seen: V2, depth: F) -> V2:
         """How a point is moved [m] that may lie `-depth` [m] deep in a body at most and is `seen` from it."""
         distance, direction, _piece = nearest(pieces, first, last, seen)
         return wp.max(depth - distance, F(0.0)) * direction
 
     return SimpleNamespace(
+        about=about,
         nearest=nearest,
         normal_of=normal_of,
         travel=travel,

@@ -7,10 +7,9 @@ goes to the slot at that end. So slots add up to the surface's reactions. They h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from warp_mpm.scenario import Prescribed, Scenario, Trapezoid
 
 from .body import Body
 from .of_scene import BARRIER
+from .outline import Segments
 from .places import PER_CELL, Places
 
 Array = NDArray[np.float64]
@@ -29,19 +29,21 @@ MOST = 4096
 
 @dataclass(frozen=True)
 class Stretch:
-    """A surface of the barrier and its n slots."""
+    """A surface of the barrier, along its straight pieces, and its n slots."""
 
     surface: str
-    piece: int
-    """Of the outline."""
+    pieces: tuple[int, ...]
+    """Of the outline, one after the other."""
     first: int
     """Its first slot."""
-    begin: Array
-    """[2] from where it is measured [m]."""
+    begins: Array
+    """[pieces, 2] where each piece begins [m]."""
     along: Array
-    """[2] unit vector."""
+    """[pieces, 2] unit vectors."""
+    starts: Array
+    """[pieces] way along the surface to where each piece begins [m]; what lies below the ground counts from 0 down."""
     edges: Array
-    """[n + 1] along it from `begin` [m], evenly spaced."""
+    """[n + 1] way along the surface to the slots' edges [m], evenly spaced."""
 
     def __len__(self) -> int:
         return len(self.edges) - 1
@@ -51,10 +53,15 @@ class Stretch:
         """Its part of all slots."""
         return slice(self.first, self.first + len(self))
 
+    def place(self, way: Array) -> Array:
+        """Points [N, 2] at t = 0 [m] at a way [N] along the surface."""
+        piece = np.maximum(np.searchsorted(self.starts, way, side="left") - 1, 0)
+        return self.begins[piece] + (way - self.starts[piece])[:, None] * self.along[piece]
+
     @property
     def heights(self) -> Array:
         """[n + 1] y of the edges at t = 0 [m]."""
-        return self.begin[1] + self.along[1] * self.edges
+        return self.place(self.edges)[:, 1]
 
 
 @dataclass(frozen=True)
@@ -110,11 +117,11 @@ class Slots:
         """Slot [C] of each place of contact, -1 of one that is none of the barrier's, and the share [C] of its impulse
         that goes there; the rest goes to the next slot."""
         slot, share = np.full(len(places), -1, dtype=np.int32), np.ones(len(places))
-        for stretch in self.stretches:
-            own = np.flatnonzero((places.body == self.body) & (places.piece == stretch.piece))
+        for stretch, piece, start_of_piece, begin, along in self._pieces():
+            own = np.flatnonzero((places.body == self.body) & (places.piece == piece))
             # A pair of nodes stands for a cell's side, a point of the surface for half of it.
             width = np.where(places.first[own] >= 0, spacing, spacing / PER_CELL)
-            start = (places.position[own] - stretch.begin) @ stretch.along - 0.5 * width - stretch.edges[0]
+            start = start_of_piece + (places.position[own] - begin) @ along - 0.5 * width - stretch.edges[0]
             length = stretch.edges[1] - stretch.edges[0]
             number = np.floor(start / length + 1e-9)
             part = np.clip(((number + 1.0) * length - start) / width, 0.0, 1.0)
@@ -126,11 +133,16 @@ class Slots:
     def feet(self, places: Places) -> Array:
         """Points [C, 2] on the surface at t = 0 [m] where the barrier's places act; those of others are nil."""
         feet = np.zeros((len(places), 2))
-        for stretch in self.stretches:
-            own = (places.body == self.body) & (places.piece == stretch.piece)
-            reach = (places.position[own] - stretch.begin) @ stretch.along
-            feet[own] = stretch.begin + reach[:, None] * stretch.along
+        for _, piece, _, begin, along in self._pieces():
+            own = (places.body == self.body) & (places.piece == piece)
+            reach = (places.position[own] - begin) @ along
+            feet[own] = begin + reach[:, None] * along
         return feet
+
+    def _pieces(self) -> Iterator[tuple[Stretch, int, float, Array, Array]]:
+        for stretch in self.stretches:
+            for piece in zip(stretch.pieces, stretch.starts, stretch.begins, stretch.along, strict=True):
+                yield stretch, *piece
 
 
 def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> Slots | None:
@@ -139,29 +151,41 @@ def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> Slots | None:
         return None
     body = [one.name for one in bodies].index(BARRIER)
     pieces = bodies[body].outline.segments
-    names = [bodies[body].surfaces[number].name for number in bodies[body].surface_of_piece]
     found: list[Stretch] = []
-    for number, (surface, (low, high)) in enumerate(zip(names, _ends(scenario, pieces.begin), strict=True)):
+    for surface in bodies[body].surfaces:
+        own = list(surface.pieces if surface.pieces is not None else range(len(pieces)))
+        if not own:
+            continue
+        starts, low, high = _along(scenario, pieces, own)
         count = int(min(max(1.0, (high - low) / scenario.numerics.spacing_m + 1e-9), MOST))
         first = found[-1].first + len(found[-1]) if found else 0
         edges = np.linspace(low, high, count + 1)
-        found.append(Stretch(surface, number, first, pieces.begin[number], pieces.along[number], edges))
+        found.append(Stretch(surface.name, tuple(own), first, pieces.begin[own], pieces.along[own], starts, edges))
     return Slots(tuple(found), body)
 
 
-def _ends(scenario: Scenario, begins: Array) -> list[tuple[float, float]]:
-    """Where each surface begins and ends along itself [m]. A wall has no end; what the flow would reach with twice its
-    energy is divided, however long the run."""
+def _along(scenario: Scenario, pieces: Segments, own: Sequence[int]) -> tuple[Array, float, float]:
+    """Way along a surface [m] to where each of its pieces begins, and to where its slots begin and end. A wall has no
+    end; what the flow would reach with twice its energy is divided, however long the run."""
     assert scenario.barrier is not None
     shape, flow = scenario.barrier.shape, scenario.flow
     if isinstance(shape, Trapezoid):
-        corners = shape.polygon
+        corners = pieces.begin if pieces.closed else shape.outline
+        lengths = np.array([float(np.hypot(*(corners[(k + 1) % len(corners)] - corners[k]))) for k in own])
+        # What goes down to the base below the ground counts to the slot at the surface's end.
+        beneath = [k >= len(pieces) - 3 for k in own] if pieces.closed else [False] * len(own)
+        shown = np.where(beneath, 0.0, lengths)
+        starts = np.concatenate([[0.0], np.cumsum(shown)[:-1]])
+        if beneath[0]:
+            starts[0] = -lengths[0]
         # A crest without width still has a slot, of no length to speak of.
-        return [(0.0, max(float(np.hypot(*(b - a))), 1e-9)) for a, b in pairwise(corners)]
-    (low, high), g = (flow.polygon[:, 1].min(), flow.polygon[:, 1].max()), -scenario.gravity.vector[1]
+        return starts, 0.0, max(float(shown.sum()), 1e-9)
+    y, g = np.concatenate(flow.outlines)[:, 1], -scenario.gravity.vector[1]
+    low, high = y.min(), y.max()
     motion, speed = scenario.barrier.motion, flow.speed
     if isinstance(motion, Prescribed):
         speed += max(abs(velocity) for velocity in motion.velocities_m_per_s)
     reach = flow.depth + (speed**2 / g if g > 0.0 else 10.0 * flow.depth)
     low = 0.0 if scenario.ground is not None else float(low) - reach
-    return [(low - float(begins[0, 1]), float(high) + reach - float(begins[0, 1]))]
+    begin = float(pieces.begin[own[0], 1])
+    return np.zeros(1), low - begin, float(high) + reach - begin

@@ -1,47 +1,100 @@
-"""The bodies that a scenario names, in the order in which they act: ground, edges of the domain, barrier."""
+"""The bodies that a scenario names, in the order in which they act: ground, edges of the domain, barriers."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from warp_mpm.grid import GridLayout
-from warp_mpm.scenario import Barrier, Prescribed, Scenario, Trapezoid
+from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Wall
 from warp_mpm.scenario import Sliding as SlidingBarrier
+from warp_mpm.scenario.site import all_standing
 
 from .body import Body, Driven, Fixed, Sliding, Surface
-from .outline import Outline
+from .outline import Array, Outline
 
 BARRIER = "barrier"
-"""Name of the scenario's barrier among the bodies."""
+"""Name of the scenario's first barrier among the bodies."""
+
+GROUND = "ground"
+"""Name of the ground, and of its surface where that is one."""
+
+BENEATH = 8.0
+"""Cells below the lowest ground to which barriers go down that stand on a profile: no point gets there."""
 
 
 def scene_bodies(scenario: Scenario, grid: GridLayout) -> list[Body]:
-    """Ground, side walls, ceiling and barrier of `scenario`, those that it has."""
+    """Ground, side walls, ceiling and barriers of `scenario`, those that it has."""
     bodies = []
     if scenario.ground is not None:
-        level = Outline([[-1.0, 0.0], [1.0, 0.0]], closed=False)
-        bodies.append(Body("ground", level, (Surface("ground", scenario.ground.friction),)))
+        bodies.append(ground_body(scenario.ground))
     bodies += _edges(scenario, grid)
-    if scenario.barrier is not None:
-        bodies.append(barrier_body(scenario.barrier))
-    return bodies
+    return bodies + barrier_bodies(scenario)
 
 
-def barrier_body(barrier: Barrier) -> Body:
-    """The barrier: an outline without its base, whose faces go on below the ground."""
-    names = {"impact": barrier.friction.face, "top": barrier.friction.top, "back": barrier.friction.back}
-    if isinstance(barrier.shape, Trapezoid):
-        outline = Outline(barrier.shape.polygon, closed=False)
-        stretches: tuple[tuple[int, ...], ...] = ((0,), (1,), (2,))
-    else:
-        outline = Outline([[0.0, 0.0], [0.0, 1.0]], closed=False)
-        stretches = ((0,), (), ())
-    surfaces = tuple(Surface(*named, pieces) for named, pieces in zip(names.items(), stretches, strict=True))
-    motion: Fixed | Driven | Sliding = Fixed()
-    if isinstance(barrier.motion, Prescribed):
-        motion = Driven(barrier.motion.times_s, tuple((v, 0.0) for v in barrier.motion.velocities_m_per_s))
-    elif isinstance(barrier.motion, SlidingBarrier):
-        assert barrier.mass is not None
-        motion = Sliding(barrier.mass, barrier.motion.base_friction_coefficient)
-    return Body(BARRIER, outline, surfaces, motion, carries_grid=not isinstance(motion, Fixed))
+def ground_body(ground: Ground) -> Body:
+    """The ground, with a surface for each stretch: `ground`, or `ground_1` and so on where there are several."""
+    if ground.level:
+        return Body(GROUND, Outline(ground.profile, closed=False), (Surface(GROUND, ground.friction),))
+    vertices = ground.profile
+    begins = [begin for begin, _ in ground.frictions[1:]]
+    for begin in begins:
+        if begin not in vertices[:, 0]:
+            place = int(np.searchsorted(vertices[:, 0], begin))
+            vertices = np.insert(vertices, place, [begin, float(ground.height(begin))], axis=0)
+    middle = 0.5 * (vertices[:-1, 0] + vertices[1:, 0])
+    # A piece belongs to the last stretch that begins before its middle; an upright step to the one that begins there.
+    stretch = np.searchsorted(begins, middle, side="right")
+    names = [f"{GROUND}_{number + 1}" for number in range(len(begins) + 1)] if begins else [GROUND]
+    surfaces = [
+        Surface(name, friction, tuple(int(piece) for piece in np.flatnonzero(stretch == number)))
+        for number, (name, (_, friction)) in enumerate(zip(names, ground.frictions, strict=True))
+    ]
+    return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces))
+
+
+def barrier_bodies(scenario: Scenario) -> list[Body]:
+    """All barriers of a scene, the first one first.
+
+    On level ground a single barrier is an outline without its base, whose faces go on below the ground; the grid rides
+    with it. Any other one is closed by a base below the ground, to which it goes straight down from toe and heel.
+    """
+    found = []
+    for name, x, barrier, standing in all_standing(scenario):
+        names = ("impact", "top", "back") if name == BARRIER else (f"{name}_face", f"{name}_top", f"{name}_back")
+        rubbing = (barrier.friction.face, barrier.friction.top, barrier.friction.back)
+        outline, stretches = _outline_of(scenario, barrier, x, standing)
+        surfaces = tuple(map(Surface, names, rubbing, stretches))
+        motion: Fixed | Driven | Sliding = Fixed()
+        if isinstance(barrier.motion, Prescribed):
+            motion = Driven(barrier.motion.times_s, tuple((v, 0.0) for v in barrier.motion.velocities_m_per_s))
+        elif isinstance(barrier.motion, SlidingBarrier):
+            assert barrier.mass is not None
+            motion = Sliding(barrier.mass, barrier.motion.base_friction_coefficient)
+        rides = scenario.plain and not isinstance(motion, Fixed)
+        found.append(Body(name, outline, surfaces, motion, carries_grid=rides))
+    return sorted(found, key=lambda body: body.name != BARRIER)
+
+
+def _outline_of(
+    scenario: Scenario, barrier: Barrier, x: float, standing: Array | None
+) -> tuple[Outline, tuple[tuple[int, ...], ...]]:
+    """A barrier's outline, and the pieces of face, crest and back, from the bottom of the face on."""
+    if standing is None:
+        return Outline([[x, 0.0], [x, 1.0]], closed=False), ((0,), (), ())
+    if scenario.plain:
+        return Outline(standing, closed=False), ((0,), (1,), (2,))
+    assert scenario.ground is not None
+    assert not isinstance(barrier.shape, Wall)
+    first, last = barrier.shape.crest_corners
+    if (standing[first] == standing[last]).all():  # a crest without width
+        standing = np.delete(standing, np.arange(first, last), axis=0)
+        last = first
+    deep = scenario.ground.range(*scenario.ground.ends)[0] if not scenario.ground.level else 0.0
+    deep = min(deep, float(standing[:, 1].min())) - BENEATH * scenario.numerics.spacing_m
+    sides = len(standing) - 1
+    vertices = np.concatenate([standing, [[standing[-1, 0], deep], [standing[0, 0], deep]]])
+    face = (sides + 2, *range(first))
+    return Outline(vertices), (face, tuple(range(first, last)), (*range(last, sides), sides, sides + 1))
 
 
 def _edges(scenario: Scenario, grid: GridLayout) -> list[Body]:

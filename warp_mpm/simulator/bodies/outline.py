@@ -26,6 +26,10 @@ TIE = 1e-12
 """Relative difference of two distances that are the same corner's."""
 
 
+FEW = 8
+"""Pieces up to which all of an outline's are looked at."""
+
+
 @dataclass(frozen=True)
 class Segments:
     """Straight pieces of an outline, G of them, each with the line that it lies on: normal · x = offset."""
@@ -96,6 +100,50 @@ class Segments:
             length = np.where(distance == 0.0, 1.0, distance)
             normal = np.where(corner[:, None], (place - foot) / length[:, None], normal)
         return distance, normal, piece
+
+    def nearest_within(self, place: Array, reach: float) -> tuple[Array, Array, NDArray[np.int64]]:
+        """As `nearest` where the distance is less than `reach` [m]. Further away it may be infinite, with its sign, and
+        normal and piece are of no matter: of a long profile only the pieces about a place are looked at."""
+        if self.closed or len(self) <= FEW or (self.along[:, 0] < 0.0).any():
+            return self.nearest(place)
+        x, y = place[:, 0], place[:, 1]
+        distance = np.copysign(np.inf, y - self._height(x))
+        normal, piece = np.zeros(place.shape), np.zeros(len(place), dtype=np.int64)
+        start, end = (self.begin[:, 0] + limit * self.along[:, 0] for limit in (self.low, self.high))
+        stretch = np.floor(x / (16.0 * reach)).astype(np.int64)
+        order = np.argsort(stretch, kind="stable")
+        for members in np.split(order, np.flatnonzero(np.diff(stretch[order])) + 1):
+            low, high = x[members].min() - reach, x[members].max() + reach
+            own = np.flatnonzero((end >= low) & (start <= high))
+            heights = [self._height_on(own, np.clip(at, low, high)) for at in (start[own], end[own])]
+            near = members[(y[members] > np.min(heights) - reach) & (y[members] < np.max(heights) + reach)]
+            found, across, number = self._some(own).nearest(place[near])
+            close = np.abs(found) < reach
+            at = near[close]
+            distance[at], normal[at], piece[at] = found[close], across[close], own[number[close]]
+        return distance, normal, piece
+
+    def _some(self, which: NDArray[np.int64]) -> Segments:
+        return Segments(
+            self.begin[which],
+            self.along[which],
+            self.low[which],
+            self.high[which],
+            self.normal[which],
+            self.offset[which],
+            self.closed,
+        )
+
+    def _height_on(self, which: NDArray[np.int64], x: Array) -> Array:
+        """y of some pieces' lines at `x`; of upright ones where they begin, whose other end is their neighbour's."""
+        run = self.along[which, 0]
+        rise = np.where(run > 0.0, self.along[which, 1] / np.where(run > 0.0, run, 1.0), 0.0)
+        return self.begin[which, 1] + (x - self.begin[which, 0]) * rise
+
+    def _height(self, x: Array) -> Array:
+        """y at `x` of the surface of an open outline that leads along x."""
+        piece = np.clip(np.searchsorted(self.begin[:, 0], x, side="right") - 1, 0, len(self) - 1)
+        return self._height_on(piece, x)
 
     def grown(self, by: Array) -> Segments:
         """The outline with each piece moved outward by its own distance `by` [G] m and joined again at the corners."""

@@ -119,7 +119,7 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
     """Mirrored pairs of nodes at the pieces along the grid, and the nodes a row further back."""
     x, y = grid.node_positions()
     place = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    distance, _, nearest = body.outline.segments.nearest(place.reshape(-1, 2))
+    distance, _, nearest = body.outline.segments.nearest_within(place.reshape(-1, 2), 3.0 * grid.spacing)
     distance = (distance / grid.spacing).reshape(place.shape[:2])
     nearest = nearest.reshape(place.shape[:2])
     node = np.argwhere((distance < 0.0) & (distance > -ROWS) & on_grid[nearest])
@@ -177,7 +177,7 @@ def _points(
             near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
         else:
             for other in others:
-                near &= other.outline.distance(at) > -1e-9 * spacing
+                near &= other.outline.segments.nearest_within(at, spacing)[0] > -1e-9 * spacing
         position.append(at[near])
         piece.append(np.full(int(near.sum()), k, dtype=np.int32))
     places, of = np.concatenate(position), np.concatenate(piece)

@@ -42,7 +42,7 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
         place = np.stack([x[corner[:, 0]], y[corner[:, 1]]], axis=-1)[:, None] + sample
         free = np.ones(place.shape[:2], dtype=bool)
         for solid in solids:
-            free &= solid.nearest(place.reshape(-1, 2))[0].reshape(free.shape) > 0.0
+            free &= solid.nearest_within(place.reshape(-1, 2), 4.0 * spacing)[0].reshape(free.shape) > 0.0
         share[corner[:, 0], corner[:, 1]] = free.mean(axis=1)
     return np.maximum(share, 0.125) * spacing**2
 
@@ -87,5 +87,6 @@ def _distance(
         columns = (x >= box[0] - reach) & (x <= box[1] + reach)
         rows = (y >= box[2] - reach) & (y <= box[3] + reach)
     place = np.stack(np.meshgrid(x[columns], y[rows], indexing="ij"), axis=-1)
-    low[np.ix_(columns, rows)] = solid.nearest(place.reshape(-1, 2))[0].reshape(place.shape[:2])
+    reach = (RUBBED + 1.0) * spacing
+    low[np.ix_(columns, rows)] = solid.nearest_within(place.reshape(-1, 2), reach)[0].reshape(place.shape[:2])
     return low

@@ -132,9 +132,15 @@ class Aflip(Flip):
             write(points.advection, p, V2(smooth[0], smooth[1]))
             return new
 
+        @wp.func
+        def halt(points: Points, p: wp.int32):
+            write(points.affine_x, p, V())
+            write(points.affine_y, p, V())
+
         return super().functions(types, tools) | {
             "start": start,
             "column": column,
             "deposit": deposit,
             "collect": collect,
+            "halt": halt,
         }

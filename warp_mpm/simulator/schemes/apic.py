@@ -102,6 +102,11 @@ class Apic(Scheme):
             write(points.affine_y, p, lean_y * (F(4.0) * parameters.inverse_spacing))
             return smooth
 
+        @wp.func
+        def halt(points: Points, p: wp.int32):
+            write(points.affine_x, p, V())
+            write(points.affine_y, p, V())
+
         return {
             "start": start,
             "force_share": force_share,
@@ -109,4 +114,5 @@ class Apic(Scheme):
             "column": column,
             "deposit": deposit,
             "collect": collect,
+            "halt": halt,
         }

@@ -84,7 +84,8 @@ class Scheme:
         - `keep(grid, i, j, old: V, new: V, time_step, parameters)`: velocities before and after (default: forgotten);
         - `receive(grid, i, j, change: V)`: what contact changes (default: nothing beside the velocity);
         - `displacement(points, p, grid, x, shift, time_step, parameters) -> V2`: of a point in the step (default: with
-          the solid's velocity).
+          the solid's velocity);
+        - `halt(points, p)`: empties its point fields where the velocity is given anew (default: it has none to empty).
         """
         raise NotImplementedError
 
@@ -128,11 +129,16 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
         v = read(points.velocity, p)
         return time_step * V2(v[0], v[1])
 
+    @wp.func
+    def halt(points: Points, p: wp.int32):
+        pass
+
     defaults = {
         "clear": clear,
         "free_velocity": free_velocity,
         "keep": keep,
         "receive": receive,
         "displacement": displacement,
+        "halt": halt,
     }
     return defaults | scheme.functions(types, tools)

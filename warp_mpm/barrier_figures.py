@@ -1,0 +1,126 @@
+"""Figures of each barrier of a scene with several: what hit it, how it moved, what passed it and where it landed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.force_record import cumulative_impulse, filtered_peak, moving_mean
+from warp_mpm.results import Snapshots
+from warp_mpm.scenario import Scenario, Wall
+from warp_mpm.scenario.site import all_standing
+from warp_mpm.snapshot import Snapshot
+
+Array = NDArray[np.float64]
+Series = Mapping[str, Array]
+
+LANDED = 1.5
+"""Cells above the ground within which a point counts as on it."""
+
+
+def barrier_figures(
+    scenario: Scenario, series: Series, snapshots: Sequence[Snapshot] | Snapshots | None
+) -> dict[str, Any]:
+    """`barriers`, a table of all barriers from upstream to downstream, of a scene with further ones; nothing of any
+    other.
+
+    Each row: `name`, `x` of the toe [m]; of the horizontal force on the whole barrier `peak_force` and
+    `peak_force_filtered` [N/m] with their times [s], and `impulse` [N s/m]; `displacement` [m], `velocity` [m/s] and
+    `work` [J/m] at the end, 0 of a fixed one; `held_volume` and `passed_volume` [m³/m] at the end, between the crest of
+    the barrier before and its own, and beyond its own; `landing_distance` [m], from its heel to where the first of what
+    passes it is on the ground; and `first_force_time` [s]. What is not known is None.
+
+    Args:
+        scenario: what was run.
+        series: columns of the time series.
+        snapshots: None leaves out what is measured on them.
+    """
+    if not scenario.barriers:
+        return {}
+    rows = []
+    beyond = _volumes_beyond(scenario, series, snapshots)
+    before = beyond.pop("inside", None)
+    for name, x, _, standing in all_standing(scenario):
+        row: dict[str, Any] = {"name": name, "x": x} | _force_figures(series, _force_on(series, name))
+        moving = {"displacement": "barrier_displacement", "velocity": "barrier_velocity", "work": "barrier_work"}
+        for figure, column in moving.items():
+            values = series.get(column if name == "barrier" else f"{name}_{column}")
+            fixed = name != "barrier" and _kind(scenario, name) == "fixed"
+            row[figure] = 0.0 if fixed else None if values is None else float(values[-1])
+        passed = beyond.get(name)
+        row["held_volume"] = None if passed is None or before is None else before - passed
+        row["passed_volume"] = before = passed
+        row["landing_distance"] = _landing(scenario, standing, snapshots)
+        rows.append(row)
+    return {"barriers": rows}
+
+
+def _kind(scenario: Scenario, name: str) -> str:
+    return next(one.motion.kind for one in scenario.barriers if one.name == name)
+
+
+def _force_on(series: Series, name: str) -> Array | None:
+    """Horizontal force on the whole of a barrier [N/m]."""
+    names = ("impact_force_x", "top_force", "back_force_x") if name == "barrier" else (f"{name}_force_x",)
+    if any(column not in series for column in names):
+        return None
+    return np.sum([series[column] for column in names], axis=0)
+
+
+def _force_figures(series: Series, force: Array | None) -> dict[str, float | None]:
+    names = ("peak_force", "peak_force_time", "peak_force_filtered", "peak_force_filtered_time", "impulse")
+    figures: dict[str, float | None] = dict.fromkeys((*names, "first_force_time"))
+    time = series["time"]
+    if force is None or len(time) < 2:
+        return figures
+    filtered = moving_mean(time, force)
+    peak, highest = int(np.argmax(force)), filtered_peak(filtered)
+    figures["impulse"] = float(cumulative_impulse(time, force)[-1])
+    if not force[peak] > 0.0:
+        return figures | {"peak_force": 0.0, "peak_force_filtered": 0.0}
+    first = int(np.argmax(force > 0.01 * force[peak]))
+    return figures | {
+        "peak_force": float(force[peak]),
+        "peak_force_time": float(time[peak]),
+        "peak_force_filtered": float(filtered[highest]),
+        "peak_force_filtered_time": float(time[highest]),
+        "first_force_time": float(time[max(first - 1, 0)]),
+    }
+
+
+def _volumes_beyond(
+    scenario: Scenario, series: Series, snapshots: Sequence[Snapshot] | Snapshots | None
+) -> dict[str, float]:
+    """Volume [m³/m] beyond each barrier's crest at the end, at the flow's initial density, and `inside`, all that is
+    there; what has left downstream is in none of them."""
+    if snapshots is None or len(snapshots) == 0:
+        return {}
+    snapshot = snapshots[-1]
+    volume = snapshot["solid_mass"] / scenario.flow.material.solid_partial_density
+    found = {"inside": float(volume.sum())}
+    for name, x, barrier in scenario.all_barriers:
+        moved = snapshot.barrier_displacement or 0.0
+        if name != "barrier":
+            moved = float(series.get(f"{name}_barrier_displacement", np.zeros(1))[-1])
+        end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.polygon[2, 0]
+        found[name] = float(volume @ (snapshot.position[:, 0] > end + moved))
+    return found
+
+
+def _landing(
+    scenario: Scenario, standing: Array | None, snapshots: Sequence[Snapshot] | Snapshots | None
+) -> float | None:
+    """From the heel to the middle of the first that is on the ground beyond it [m], to a snapshot's time; None where
+    nothing is, or something was there at the start."""
+    if standing is None or snapshots is None or scenario.ground is None:
+        return None
+    spacing, heel = scenario.numerics.spacing_m, float(standing[:, 0].max())
+    for number, snapshot in enumerate(snapshots):
+        x, y = snapshot.position.T
+        landed = (x > heel + spacing) & (y - scenario.ground.height(x) < LANDED * spacing)
+        if landed.any():
+            return float(np.median(x[landed])) - heel if number else None
+    return None
