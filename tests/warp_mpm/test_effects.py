@@ -17,7 +17,7 @@ from warp_mpm.simulation import Simulation, derive_effects
 from warp_mpm.time_step import step_limits
 
 SCENES = Path(__file__).parents[2] / "scenarios"
-SHIPPED = sorted(path.stem for path in SCENES.glob("*.json"))
+SHIPPED = sorted(path.stem for path in SCENES.glob("*.json") if not path.stem.startswith("site_"))
 
 TRANSPORT = ["clear", "forget", "scatter", "move"]
 CONTACT = ["press", "join"]
