@@ -385,16 +385,18 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
+        wet = wp.bool(True)
         if contact.fixed[e] == 0:
             at = contact.position[e] + displaced(bodies, contact.body[e])
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
             contact.first[e] = wp.int32(-1)
-            if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1 and in_use(grid, i, j):
+            if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
                 contact.first[e] = (i - 1) * parameters.rows + j - 1
                 contact.weight_x[e] = weights(fx)
                 contact.weight_y[e] = weights(fy)
+                wet = in_use(grid, i, j)
         inverse = F(0.0)
-        if contact.first[e] >= 0:
+        if contact.first[e] >= 0 and wet:
             inverse = inverse_mass(contact, e, grid, parameters)
         contact.inverse[e] = inverse
 
