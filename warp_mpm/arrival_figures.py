@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.geometry import area
 from warp_mpm.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -52,6 +53,6 @@ def arrival_figures(scenario: Scenario, series: Mapping[str, Array], figures: Ma
         left = series.get("left_mass")
         known = None if left is None else float(left[-1]) / flow.material.density
         found["left_volume"] = departed_volume(scenario, figures) if known is None else known
-        found["initial_volume"] = flow.volume + flow.deposited_volume
-        found["initial_volume"] -= flow.inflow.volume if flow.inflow is not None else 0.0
+        there = area(flow.shape.polygon) if flow.shape is not None else 0.0
+        found["initial_volume"] = there + flow.deposited_volume
     return found
