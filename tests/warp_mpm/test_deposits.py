@@ -50,16 +50,16 @@ def test_volumes_tell_the_flow_from_its_deposits():
     ("deposits", "sentence"),
     [
         (
-            [{"shape": HEAP["shape"] | {"height_m": 0}}],
-            r"height_m = 0 is not allowed; it must be a finite number at lea",
+            [{"shape": HEAP["shape"] | {"depth_m": 0}}],
+            r"depth_m = 0 is not allowed; it must be a finite number greater",
         ),
-        ([{"shape": HEAP["shape"] | {"right_m": -30}}], "right_m = -30 must lie downstream of left_m = -30"),
+        ([{"shape": HEAP["shape"] | {"to_m": -30}}], "to_m = -30 must be at least 1e-06 m, .* beyond from_m = -30"),
         ([{"shape": {"kind": "polygon", "vertices_m": [[-9, 0], [-8, 0], [-7, 0]]}}], "must enclose an area greater"),
         (
-            [{"shape": HEAP["shape"] | {"height_m": 1e-3}}],
+            [{"shape": HEAP["shape"] | {"depth_m": 1e-3}}],
             r"leaves less than one material point for flow.deposits\[0\]",
         ),
-        ([{"shape": HEAP["shape"] | {"right_m": 2}}], r"flow.deposits\[0\] lies inside the barrier by"),
+        ([{"shape": HEAP["shape"] | {"to_m": 2}}], r"flow.deposits\[0\] lies inside the barrier by"),
         ([HEAP, HEAP], r"flow.deposits\[0\] and flow.deposits\[1\] lie in one place; they must not overlap"),
         (
             [HEAP | {"material": {"porosity": 0.3}}],
