@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from warp_mpm.extent import domain_caveats
-from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
+from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial, Wall
 from warp_mpm.simulator.laws import LAWS
 from warp_mpm.slips import slips
 
@@ -42,7 +42,7 @@ def scene_caveats(scenario: Scenario) -> list[str]:
         )
     found += slips(scenario)
     found += LAWS.named(flow.material.law).caveats(flow.material)
-    found += [*_unlikely_friction(scenario), *_impossible_start(scenario)]
+    found += [*_unlikely_friction(scenario), *_impossible_start(scenario), *_deposits_behind(scenario)]
     uneven = scenario.ground is not None and scenario.ground.profile_m is not None
     if scenario.barrier is not None and not uneven and not _can_arrive(scenario):
         driven = isinstance(scenario.barrier.motion, Prescribed)
@@ -53,6 +53,19 @@ def scene_caveats(scenario: Scenario) -> list[str]:
             + "gravity.tilt_deg and output.end_time_s."
         )
     return [*found, *domain_caveats(scenario)]
+
+
+def _deposits_behind(scenario: Scenario) -> list[str]:
+    """Deposits beyond the barrier's crest, which volumes take for what went over it."""
+    if scenario.barrier is None or isinstance(scenario.barrier.shape, Wall):
+        return []
+    crest = float(scenario.barrier.shape.polygon[2, 0])
+    return [
+        f"flow.deposits[{place}] reaches beyond the barrier's crest: overtopped_volume, and a limit of it, count what "
+        "lies there too."
+        for place, deposit in enumerate(scenario.flow.deposits)
+        if deposit.shape.polygon[:, 0].max() > crest + 1e-9
+    ]
 
 
 def _unlikely_friction(scenario: Scenario) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warp_mpm import plotting
+from warp_mpm.caveats import scene_caveats
 from warp_mpm.discretization import material_points
 from warp_mpm.extent import domain_extent
 from warp_mpm.scenario import Scenario
@@ -120,6 +121,15 @@ def test_bodies_have_the_stress_of_their_own_slope():
     ):
         assert chosen.any()
         np.testing.assert_allclose(total[chosen], (weight * depth / (1.0 + slope**2))[chosen], rtol=1e-9)
+
+
+def test_a_deposit_behind_the_barrier_is_told_of():
+    trapezoid = {"kind": "trapezoid", "base_width_m": 4, "crest_width_m": 1, "height_m": 2}
+    barrier = {"shape": trapezoid, "motion": {"kind": "fixed"}, "friction": 0.3}
+    for begin, told in ((-10, False), (6, True)):
+        deposit = {"shape": {"kind": "on_ground", "from_m": begin, "to_m": begin + 4, "depth_m": 1}}
+        notes = scene_caveats(scene(barrier=barrier, **{"flow.deposits": [deposit]}))
+        assert any("flow.deposits[0] reaches beyond the barrier's crest" in note for note in notes) == told
 
 
 def test_a_fitted_domain_holds_the_approach():

@@ -84,6 +84,7 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "notes": list(scenario.notes),
         "ground": _ground(results),
         "barriers": _barriers(results),
+        "section": _section(results),
     }
 
 
@@ -259,6 +260,14 @@ def _barriers(results: Results) -> list[dict[str, Any]]:
         else:
             found.append({"name": name, "kind": "polygon", "corners": standing.tolist()})
     return found
+
+
+def _section(results: Results) -> list[list[float]] | None:
+    """Foot and top of the section of an inflow."""
+    inflow = results.scenario.flow.inflow
+    if inflow is None:
+        return None
+    return [[inflow.x_m, inflow.base], [inflow.x_m, inflow.base + inflow.greatest_depth]]
 
 
 def _versions(record: Mapping[str, Any]) -> dict[str, str]:

@@ -120,6 +120,12 @@ function drawGround(pen, view, line) {
   pen.beginPath(); trace(); pen.strokeStyle = "#61656b"; pen.lineWidth = 1; pen.stroke();
 }
 
+function drawSection(pen, view, section) {
+  if (!section) return;
+  pen.beginPath(); section.forEach(([x, y], i) => (i ? pen.lineTo : pen.moveTo).call(pen, view.px(x), view.py(y)));
+  pen.setLineDash([2, 3]); pen.strokeStyle = "#0072b2"; pen.lineWidth = 1.2; pen.stroke(); pen.setLineDash([]);
+}
+
 function drawBarrier(pen, view, barrier, shift, ghost) {
   const trace = offset => {
     pen.beginPath();
@@ -143,6 +149,7 @@ function drawCloud(canvas, view, cloud, frame, field, low, high, colours) {
   drawAxes(pen, view, false);
   drawGround(pen, view, cloud.run.ground);
   cloud.run.barriers.forEach((barrier, i) => drawBarrier(pen, view, barrier, cloud.points.shifts[frame][i] || 0, true));
+  drawSection(pen, view, cloud.run.section);
   const xs = cloud.raw(frame, 0), ys = cloud.raw(frame, 1);
   const [xLow, xHigh] = cloud.points.ranges[0], [yLow, yHigh] = cloud.points.ranges[1];
   const xScale = (xHigh - xLow) / 65535, yScale = (yHigh - yLow) / 65535;
