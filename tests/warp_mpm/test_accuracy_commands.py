@@ -89,19 +89,21 @@ def test_ladders_of_several_scenes_and_their_data(
     for picture in ("closed_form", "error_against_cost"):
         assert (out / f"{picture}.png").stat().st_size > 10_000
     assert "closed form, paper's λ" in (out / "closed_form.md").read_text()
-    scenes = json.loads(data.read_text())["scenes"]
-    sliding = scenes[scene_key(Scenario.load(coarse))]
+    content = json.loads(data.read_text())
+    scenes, fields = content["scenes"], frozenset(content["fields"])
+    of_coarse, of_fixed = (scene_key(Scenario.load(file), fields) for file in (coarse, fixed))
+    sliding = scenes[of_coarse]
     assert [rung["spacing"] for rung in sliding["rungs"]] == [2.0, 1.6, 1.2, 0.8]
     assert sliding["rungs"][0]["figures"]["barrier_displacement_final"] > 0.0
     assert set(sliding["shared"]) == {"peak_force", "impulse", "barrier_displacement_final"}
     assert all(0.0 < change < 2.0 for change in sliding["shared"].values())
     monkeypatch.setattr(shipped, "_data", lambda: json.loads(data.read_text()))
-    assert shipped.shipped_scenes()[scene_key(Scenario.load(coarse))].shared == sliding["shared"]
-    del scenes[scene_key(Scenario.load(coarse))]["shared"]
+    assert shipped.shipped_scenes()[of_coarse].shared == sliding["shared"]
+    del scenes[of_coarse]["shared"]
     data_without = json.loads(data.read_text()) | {"scenes": scenes}
     monkeypatch.setattr(shipped, "_data", lambda: data_without)
-    assert list(shipped.shipped_scenes()) == [scene_key(Scenario.load(fixed))]  # no promise rests on a ladder alone
-    assert "barrier_displacement_final" not in scenes[scene_key(Scenario.load(fixed))]["rungs"][0]["figures"]
+    assert list(shipped.shipped_scenes()) == [of_fixed]  # no promise rests on a ladder alone
+    assert "barrier_displacement_final" not in scenes[of_fixed]["rungs"][0]["figures"]
     # The same again: nothing is run.
     again = CliRunner().invoke(app, command)
     assert "running (" not in again.stderr
