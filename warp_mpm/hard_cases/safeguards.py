@@ -98,7 +98,7 @@ KNOWN_LIMITS = (
     "few milliseconds. The figure `pore_pressure_max` leaves them out, `pore_pressure_max_anywhere` holds them.",
     "Without gravity nothing tells how small a barrier's velocity still counts: three of the first steps of "
     "`weightless`, in which it begins to move from nothing, do not settle to a thousandth of it in a hundred sweeps; "
-    "the steps after do. On two cells of depth with a point each, its displacement changes by 4.9 % with half the step.",
+    "the steps after do. On two cells of depth with a point each, its displacement changes by 4.9 % at half the step.",
     "At the corner of an upright step in the ground (`ground_steps`, 20 m/s against a step of two cells) points come "
     "half a cell deep and are set back, in 0.9 % of points and steps. Where a leaning face turns the flow back on "
     "itself (`overhanging_face`), the sheet that flies is thin: in 23 % of points and steps a gap is cut to the room.",
