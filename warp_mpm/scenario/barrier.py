@@ -39,10 +39,10 @@ class Trapezoid(Model):
         if sum(measure is None for measure in measures) > 1:
             raise ValueError("needs at least three of base_width_m, crest_width_m, height_m and face_angle_deg")
         base, crest, height = self.base_crest_height
-        if not (0.0 <= crest <= base and height > 0.0):
+        if not (0.0 <= crest <= base and base > 0.0 and height > 0.0):
             raise ValueError(
                 f"base_width_m = {base:g}, crest_width_m = {crest:g} and height_m = {height:g} make no barrier; "
-                "the crest must be from 0 to as wide as the base, and the height greater than 0"
+                "the crest must be from 0 to as wide as the base, base and height greater than 0"
             )
         if self.face_angle_deg is not None and abs(self.built_face_angle_deg - self.face_angle_deg) > 1.0:
             raise ValueError(
