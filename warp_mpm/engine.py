@@ -23,6 +23,9 @@ POLL = 0.2
 
 DIED = "the process died, for want of memory perhaps"
 
+_CONTEXT = multiprocessing.get_context("spawn")
+"""Warp's state does not survive a fork."""
+
 ALLOWED_FAILURES = 5
 """How many of Dask's workers may die under a task before it counts as failed: one that kills them must not go on."""
 
@@ -87,38 +90,20 @@ class Processes:
         stop: Callable[[], bool] = lambda: False,
     ) -> Iterator[Ended]:
         """As of any engine."""
-        context = multiprocessing.get_context("spawn")  # Warp's state does not survive a fork
-        waiting = list(tasks)
-        running: dict[Connection, tuple[Task, SpawnProcess]] = {}
-        told = False
-        try:
-            while running or (waiting and not stop()):
-                while waiting and len(running) < self.at_once and not stop():
-                    task = waiting.pop(0)
-                    ours, theirs = context.Pipe(duplex=False)
-                    process = context.Process(
-                        target=_work, args=(theirs, task.function, task.arguments), name=task.name
-                    )
-                    with _held_ctrl_c():
-                        process.start()
-                    theirs.close()
-                    running[ours] = task, process
-                    on_start(task)
-                ready = wait(list(running), timeout=POLL)
-                if stop() and not told:
-                    told = True
-                    for _, process in running.values():
-                        process.terminate()
-                for pipe in ready:
-                    assert isinstance(pipe, Connection)
-                    task, process = running.pop(pipe)
-                    yield _ended(task, process, pipe)
-                for task, _ in running.values():
-                    on_look(task)
-        finally:
-            for pipe, (_, process) in running.items():
-                process.terminate()
+
+        def begun(task: Task) -> tuple[Connection, SpawnProcess]:
+            ours, theirs = _CONTEXT.Pipe(duplex=False)
+            process = _CONTEXT.Process(target=_work, args=(theirs, task.function, task.arguments), name=task.name)
+            return _started(process, ours, theirs)
+
+        def ended(task: Task, pipe: Connection, process: SpawnProcess) -> Ended:
+            end = _end_of(task, pipe, process)
+            if not end.died:
                 pipe.close()
+                process.join()
+            return end
+
+        return _in_turn(tasks, self.at_once, begun, ended, on_start, on_look, stop)
 
 
 class Standing:
@@ -150,39 +135,14 @@ class Standing:
         stop: Callable[[], bool] = lambda: False,
     ) -> Iterator[Ended]:
         """As of any engine."""
-        waiting = list(tasks)
-        running: dict[Connection, tuple[Task, SpawnProcess]] = {}
-        told = False
-        try:
-            while running or (waiting and not stop()):
-                while waiting and len(running) < self.at_once and not stop():
-                    task = waiting.pop(0)
-                    ours, process = self._given(task)
-                    running[ours] = task, process
-                    on_start(task)
-                ready = wait(list(running), timeout=POLL)
-                if stop() and not told:
-                    told = True
-                    for _, process in running.values():
-                        process.terminate()
-                for pipe in ready:
-                    assert isinstance(pipe, Connection)
-                    task, process = running.pop(pipe)
-                    try:
-                        result, problem = pipe.recv()
-                    except EOFError:
-                        pipe.close()
-                        process.join()
-                        yield Ended(task, None, DIED, True, process.exitcode)
-                        continue
-                    self._idle.append((pipe, process))
-                    yield Ended(task, result, problem)
-                for task, _ in running.values():
-                    on_look(task)
-        finally:
-            for pipe, (_, process) in running.items():
-                process.terminate()
-                pipe.close()
+
+        def ended(task: Task, pipe: Connection, process: SpawnProcess) -> Ended:
+            end = _end_of(task, pipe, process)
+            if not end.died:
+                self._idle.append((pipe, process))
+            return end
+
+        return _in_turn(tasks, self.at_once, self._given, ended, on_start, on_look, stop)
 
     def _given(self, task: Task) -> tuple[Connection, SpawnProcess]:
         """A process that has been given the task: one that stands idle, unless it has died meanwhile, or a new one."""
@@ -197,13 +157,8 @@ class Standing:
         return ours, process
 
     def _begun(self) -> tuple[Connection, SpawnProcess]:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs,), name="standing")
-        with _held_ctrl_c():
-            process.start()
-        theirs.close()
-        return ours, process
+        ours, theirs = _CONTEXT.Pipe()
+        return _started(_CONTEXT.Process(target=_serve, args=(theirs,), name="standing"), ours, theirs)
 
 
 @dataclass(frozen=True)
@@ -330,15 +285,60 @@ def _end_with_parent() -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
-def _ended(task: Task, process: SpawnProcess, pipe: Connection) -> Ended:
+def _in_turn(
+    tasks: Sequence[Task],
+    at_once: int,
+    begun: Callable[[Task], tuple[Connection, SpawnProcess]],
+    ended: Callable[[Task, Connection, SpawnProcess], Ended],
+    on_start: Callable[[Task], None],
+    on_look: Callable[[Task], None],
+    stop: Callable[[], bool],
+) -> Iterator[Ended]:
+    """The tasks in processes, `at_once` of them at a time: `begun` gives one a process, `ended` takes what it sent."""
+    waiting = list(tasks)
+    running: dict[Connection, tuple[Task, SpawnProcess]] = {}
+    told = False
+    try:
+        while running or (waiting and not stop()):
+            while waiting and len(running) < at_once and not stop():
+                task = waiting.pop(0)
+                pipe, process = begun(task)
+                running[pipe] = task, process
+                on_start(task)
+            ready = wait(list(running), timeout=POLL)
+            if stop() and not told:
+                told = True
+                for _, process in running.values():
+                    process.terminate()
+            for one in ready:
+                assert isinstance(one, Connection)
+                task, process = running.pop(one)
+                yield ended(task, one, process)
+            for task, _ in running.values():
+                on_look(task)
+    finally:
+        for pipe, (_, process) in running.items():
+            process.terminate()
+            pipe.close()
+
+
+def _started(process: SpawnProcess, ours: Connection, theirs: Connection) -> tuple[Connection, SpawnProcess]:
+    """The process, begun, and our end of its pipe."""
+    with _held_ctrl_c():
+        process.start()
+    theirs.close()
+    return ours, process
+
+
+def _end_of(task: Task, pipe: Connection, process: SpawnProcess) -> Ended:
+    """What came of a task; a process that died is done with."""
     try:
         result, problem = pipe.recv()
-        died = False
     except EOFError:
-        result, problem, died = None, DIED, True
-    pipe.close()
-    process.join()
-    return Ended(task, result, problem, died, process.exitcode if died else None)
+        pipe.close()
+        process.join()
+        return Ended(task, None, DIED, True, process.exitcode)
+    return Ended(task, result, problem)
 
 
 def _problem(future: Any) -> str:

@@ -56,10 +56,11 @@ def test_what_was_measured_before_an_interrupt_is_kept_and_taken_over(tmp_path, 
     assert json.loads((tmp_path / "hard_cases.json").read_text())[kept]["figures"]["wall_time"] == 0.1
     assert command(*words).exit_code == 0  # without --resume everything is
     assert len(run) == 5
-    # What another program measured, or this one without the runs at half the time step, is not taken over.
-    monkeypatch.setattr("warp_mpm.hard_cases.record.run_key", lambda scenario: "other")
+    # What another program measured, also one with other bounds, is not taken over.
+    monkeypatch.setattr("warp_mpm.hard_cases.record.code_digest", ",".join)
     assert command(*words, "--resume").exit_code == 0
     assert len(run) == 7
+    assert "warp_mpm.hard_cases.bounds," in (tmp_path / "hard_cases.json").read_text()
     (tmp_path / "hard_cases.json").write_text("{")
     assert "cannot be read" in command(*words, "--resume").stderr
 

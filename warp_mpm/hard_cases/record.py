@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analytic.whole_file import write_whole
-from warp_mpm.accuracy.keys import code_digest, run_key
+from warp_mpm.accuracy.keys import code_digest, imported_by, run_key
 from warp_mpm.fields import field_named
 from warp_mpm.hard_cases.collection import HardCase
 from warp_mpm.hard_cases.criteria import CRITERIA
@@ -27,7 +27,7 @@ class Kept:
     """Figures of the cases that have been run, in a file that is written whole after each.
 
     Args:
-        path: of the file; an earlier run's cases stay in it until they are run again.
+        path: of the file; an earlier run's cases stay in it if this one goes on with it.
         halved: whether this run makes the runs at half the time step.
         goes_on: find what the same program has measured before.
     """
@@ -63,7 +63,8 @@ class Kept:
         write_whole(self._path, json.dumps(self._cases, indent=2) + "\n")
 
     def _key(self, case: HardCase) -> str:
-        own = code_digest(["warp_mpm.hard_cases.measure"])
+        # Figures are ratios to bounds: whatever the measurement imports counts, not its own module alone.
+        own = code_digest(sorted(imported_by("warp_mpm.hard_cases.measure")))
         return f"{run_key(case.scenario)}-{own}" + "-halved" * self._halved
 
 
