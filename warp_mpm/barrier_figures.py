@@ -53,7 +53,7 @@ def barrier_figures(
         passed = beyond.get(name)
         row["held_volume"] = None if passed is None or before is None else before - passed
         row["passed_volume"] = before = passed
-        row["landing_distance"] = _landing(scenario, standing, snapshots)
+        row["landing_distance"] = _landing(scenario, name, standing, series, snapshots)
         rows.append(row)
     return {"barriers": rows}
 
@@ -102,24 +102,35 @@ def _volumes_beyond(
     volume = snapshot["solid_mass"] / scenario.flow.material.solid_partial_density
     found = {"inside": float(volume.sum())}
     for name, x, barrier in scenario.all_barriers:
-        moved = snapshot.barrier_displacement or 0.0
-        if name != "barrier":
-            moved = float(series.get(f"{name}_barrier_displacement", np.zeros(1))[-1])
+        moved = _moved(name, series, snapshot)
         end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.polygon[2, 0]
         found[name] = float(volume @ (snapshot.position[:, 0] > end + moved))
     return found
 
 
+def _moved(name: str, series: Series, snapshot: Snapshot) -> float:
+    """Displacement of a barrier [m] at a snapshot; that of further ones is in the time series alone."""
+    if name == "barrier":
+        return snapshot.barrier_displacement or 0.0
+    column = series.get(f"{name}_barrier_displacement")
+    return 0.0 if column is None else float(np.interp(snapshot.time, series["time"], column))
+
+
 def _landing(
-    scenario: Scenario, standing: Array | None, snapshots: Sequence[Snapshot] | Snapshots | None
+    scenario: Scenario,
+    name: str,
+    standing: Array | None,
+    series: Series,
+    snapshots: Sequence[Snapshot] | Snapshots | None,
 ) -> float | None:
-    """From the heel to the middle of the first that is on the ground beyond it [m], to a snapshot's time; None where
-    nothing is, or something was there at the start."""
+    """From the heel, where it is then, to the middle of the first that is on the ground beyond it [m], to a snapshot's
+    time; None where nothing is, or something was there at the start."""
     if standing is None or snapshots is None or scenario.ground is None:
         return None
-    spacing, heel = scenario.numerics.spacing_m, float(standing[:, 0].max())
+    spacing = scenario.numerics.spacing_m
     for number, snapshot in enumerate(snapshots):
         x, y = snapshot.position.T
+        heel = float(standing[:, 0].max()) + _moved(name, series, snapshot)
         landed = (x > heel + spacing) & (y - scenario.ground.height(x) < LANDED * spacing)
         if landed.any():
             return float(np.median(x[landed])) - heel if number else None

@@ -42,7 +42,12 @@ def scene_caveats(scenario: Scenario) -> list[str]:
         )
     found += slips(scenario)
     found += LAWS.named(flow.material.law).caveats(flow.material)
-    found += [*_unlikely_friction(scenario), *_impossible_start(scenario), *_deposits_behind(scenario)]
+    found += [
+        *_unlikely_friction(scenario),
+        *_impossible_start(scenario),
+        *_deposits_behind(scenario),
+        *_abrupt_inflow(scenario),
+    ]
     uneven = scenario.ground is not None and scenario.ground.profile_m is not None
     if scenario.barrier is not None and not uneven and not _can_arrive(scenario):
         driven = isinstance(scenario.barrier.motion, Prescribed)
@@ -53,6 +58,23 @@ def scene_caveats(scenario: Scenario) -> list[str]:
             + "gravity.tilt_deg and output.end_time_s."
         )
     return [*found, *domain_caveats(scenario)]
+
+
+def _abrupt_inflow(scenario: Scenario) -> list[str]:
+    """Where what approaches a section stretches less than its table asks for."""
+    inflow = scenario.flow.inflow
+    if inflow is None:
+        return []
+    asked, most = inflow.slackening, inflow.most_stretch(scenario.gravity.acceleration_m_per_s2)
+    beyond = np.flatnonzero((inflow.depths > 0.0) & (np.abs(asked) > most * (1.0 + 1e-9)))
+    if not len(beyond):
+        return []
+    first = beyond[0]
+    return [
+        f"flow.inflow: the velocity changes so fast at t = {inflow.times[first]:g} s that what approaches the section "
+        f"would stretch by {asked[first]:.3g} of its length a second; {most[first]:.3g} is the most that is followed, "
+        "and the flow makes up for the rest once it is let go."
+    ]
 
 
 def _deposits_behind(scenario: Scenario) -> list[str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warp_mpm.caveats import scene_caveats
 from warp_mpm.discretization import SMALLEST_POINT, arriving_points, material_points
 from warp_mpm.extent import domain_extent
 from warp_mpm.kernels.layout import HELD
@@ -57,10 +58,21 @@ def test_volume_and_way_of_a_table_by_fine_sums():
 
 def test_a_stream_that_slows_down_stretches_and_sinks():
     inflow = Inflow(x_m=-5.0, times_s=[0, 1, 2, 3], depths_m=[1, 1, 1, 1], velocities_m_per_s=[8, 8, 6, 4])
-    np.testing.assert_allclose(inflow.stretches, [0.0, 1.0 / 8.0, 2.0 / 6.0, 2.0 / 4.0])
+    np.testing.assert_allclose(inflow.stretches(9.81), [0.0, 1.0 / 8.0, 2.0 / 6.0, 2.0 / 4.0])
     # Whatever the table: a surface that falls by a quarter of √(g h) at most.
     abrupt = Inflow(x_m=-5.0, times_s=[0, 1, 1.01], depths_m=[1, 1, 1], velocities_m_per_s=[8, 8, 0.1])
-    np.testing.assert_allclose(abrupt.stretches[1:], 0.25 * np.sqrt(9.81), rtol=1e-12)
+    for gravity in (9.81, 4.0):
+        np.testing.assert_allclose(abrupt.stretches(gravity)[1:], 0.25 * np.sqrt(gravity), rtol=1e-12)
+
+
+def test_a_change_that_is_not_followed_is_told(load_scene):
+    scene = load_scene("site_two_surges")
+    assert not [sentence for sentence in scene_caveats(scene) if sentence.startswith("flow.inflow: the velocity")]
+    table = {"times_s": [0, 1, 1.01], "depths_m": [1, 1, 1], "velocities_m_per_s": [8, 8, 0.1]}
+    abrupt = scene.replaced({"flow.inflow": {"x_m": scene.flow.inflow.x_m} | table})
+    told = [sentence for sentence in scene_caveats(abrupt) if sentence.startswith("flow.inflow: the velocity")]
+    assert "at t = 1 s" in told[0]
+    assert "0.783 is the most that is followed" in told[0]
 
 
 def test_surges_are_told_apart():

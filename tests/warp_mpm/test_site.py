@@ -17,12 +17,13 @@ from warp_mpm.extent import domain_extent
 from warp_mpm.grid import fit_grid
 from warp_mpm.kernels import layout as at
 from warp_mpm.run import run_in_memory, run_scenario
-from warp_mpm.scenario.site import standing_outline
+from warp_mpm.scenario.site import all_standing, standing_outline
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulator.bodies import Outline
 from warp_mpm.simulator.bodies.arrays import effects_of, pieces_by_column
 from warp_mpm.simulator.bodies.kernels import RUBBED
+from warp_mpm.snapshot import Snapshot
 from warp_mpm.validation.scenes import material
 
 SLOPE = [[-40, 12], [-20, 6], [0, 0], [15, 0], [20, -2], [40, -4]]
@@ -451,6 +452,23 @@ def test_several_barriers_have_forces_motion_and_figures_of_their_own(two):
     assert summary["momentum_error"] < 1e-9
     assert summary["energy_error"] < 0.01
     assert barrier_figures(two.scenario.replaced({"barriers": []}), series, None) == {}
+
+
+def test_what_a_barrier_has_left_behind_has_not_landed_beyond_it(two):
+    """The heel is where the barrier has got to: what lies where it stood is upstream of it."""
+    scenario, heel = two.scenario, float(all_standing(two.scenario)[1][-1][:, 0].max())
+    times = np.array([0.0, 1.0])
+    series = {"time": times, "second_barrier_displacement": np.array([0.0, 6.0])}
+
+    def snapshots(x):
+        place = np.array([[x, float(scenario.ground.height(x)) + 0.1]])
+        at_start = Snapshot(0.0, 0.0, np.array([[-30.0, 30.0]]), {"solid_mass": np.ones(1)})
+        return [at_start, Snapshot(1.0, 0.0, place, {"solid_mass": np.ones(1)})]
+
+    landed = [barrier_figures(scenario, series, snapshots(heel + x))["barriers"][1] for x in (4.0, 9.0)]
+    assert landed[0]["landing_distance"] is None
+    assert landed[1]["landing_distance"] == pytest.approx(3.0)
+    assert [one["passed_volume"] > 0.0 for one in landed] == [False, True]
 
 
 def test_slots_of_a_face_with_a_lip_add_up_to_its_reactions(two):

@@ -174,13 +174,24 @@ class Inflow(Model):
         return np.concatenate([[0.0], np.cumsum(steps)])
 
     @property
-    def stretches(self) -> Array:
+    def slackening(self) -> Array:
         """Change of the velocity along x at the section at the times [K] [1/s], of a flow of which each part keeps its
-        own velocity: -(du/dt) / u. Bounded, so that the surface falls or rises at a quarter of √(g h) at most."""
-        u, h = self.velocities, self.depths
-        gain = np.gradient(u, self.times)
-        bound = 0.25 * np.sqrt(9.81 / np.maximum(h, 1e-9))
-        return np.clip(-np.divide(gain, u, out=np.zeros(len(u)), where=u > 0.0), -bound, bound)
+        own velocity: -(du/dt) / u."""
+        u = self.velocities
+        return -np.divide(np.gradient(u, self.times), u, out=np.zeros(len(u)), where=u > 0.0)
+
+    def most_stretch(self, gravity: float) -> Array:
+        """That change [K] [1/s] at which the surface falls or rises at a quarter of √(g h)."""
+        return 0.25 * np.sqrt(gravity / np.maximum(self.depths, 1e-9))
+
+    def stretches(self, gravity: float) -> Array:
+        """How what approaches the section stretches at the times [K] [1/s]: it slackens, within `most_stretch`.
+
+        Args:
+            gravity: acceleration [m/s²] of the scene.
+        """
+        most = self.most_stretch(gravity)
+        return np.clip(self.slackening, -most, most)
 
     def way(self, time: float) -> float:
         """That way until a time [s]."""

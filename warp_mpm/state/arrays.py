@@ -85,7 +85,7 @@ def arrival_arrays(scenario: Scenario, types: SimpleNamespace, *, device: Any) -
         "times": inflow.times,
         "velocities": inflow.velocities,
         "ways": inflow.ways,
-        "stretches": inflow.stretches,
+        "stretches": inflow.stretches(scenario.gravity.acceleration_m_per_s2),
         "section": inflow.x_m,
         "base": inflow.base,
         "slope": inflow.slope,
