@@ -44,7 +44,9 @@ def made_up(name="made-up", off=0.0):
             remarks=["A remark that explains."],
         )
 
-    return Case(name=name, title="Made up", tests="A test.", source="a book", limit="1 %", run=run)
+    return Case(
+        name=name, title="Made up", tests="A test.", source="a book", limit="1 %", run=run, module=Case.__module__
+    )
 
 
 @pytest.fixture
@@ -105,6 +107,46 @@ def test_what_ended_before_an_interrupt_is_on_the_page(tmp_path, monkeypatch):
     assert result.exit_code == 130
     assert "Interrupted in second; 1 of 2 cases are on the page" in result.stderr
     assert "a length" in (tmp_path / "validation.md").read_text(encoding="utf-8")
+
+
+def test_a_validation_that_stopped_goes_on(tmp_path, monkeypatch):
+    """The same program and question take a result over, whole; another question does not."""
+    ran = []
+
+    def counted(name):
+        case = made_up(name, off=0.05)
+        return dataclasses.replace(case, run=lambda quick: ran.append(name) or case.run(quick))
+
+    def heard(quick):
+        raise KeyboardInterrupt
+
+    def validate(*cases, options=()):
+        monkeypatch.setattr(catalogue, "CASES", cases)
+        return runner.invoke(app, ["validate", "--out", str(tmp_path), *options])
+
+    first, second = counted("first"), counted("second")
+    assert validate(first, dataclasses.replace(second, run=heard)).exit_code == 130
+    before = (tmp_path / "validation.md").read_text(encoding="utf-8")
+    assert validate(first, second, options=["--resume"]).exit_code == 1
+    assert ran == ["first", "second"]
+    after = (tmp_path / "validation.md").read_text(encoding="utf-8")
+    assert before[before.index("## Made up") :] in after
+    assert validate(first, second, options=["--resume", "--quick"]).exit_code == 1
+    assert ran == ["first", "second"] * 2
+    (tmp_path / "validation" / "first.png").unlink()
+    assert validate(first, second, options=["--resume", "--quick"]).exit_code == 1
+    assert ran == ["first", "second"] * 2 + ["first"]
+    assert validate(first, second).exit_code == 1
+    assert ran == ["first", "second"] * 2 + ["first"] + ["first", "second"]
+
+
+def test_kept_results_that_cannot_be_read_are_one_sentence(tmp_path, only_made_up):
+    only_made_up()
+    (tmp_path / "validation.json").write_text('{"made-up": 3}')
+    result = runner.invoke(app, ["validate", "--resume", "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "validation.json cannot be read: " in result.stderr
+    assert "without --resume it is replaced." in result.stderr
 
 
 def test_an_unknown_case_is_one_sentence(tmp_path):

@@ -33,6 +33,9 @@ def validate(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the page and its plots.")] = Path(
         "runs/validation"
     ),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Take over what this program has run before into the same folder.")
+    ] = False,
 ) -> None:
     """Run the cases whose answers are known, and write a page of ours beside the reference.
 
@@ -40,12 +43,13 @@ def validate(
     measured/. Every case has a limit; a number that misses it stays on the page as short, with the reason.
 
     Exit codes: 0 all within their limits, 1 some fall short, 2 the input cannot be used, 130 interrupted; the page then
-    holds the cases that ended.
+    holds the cases that ended, and --resume goes on.
     """
     from rich.console import Console
 
     from analytic.command_line import complain, refusals
     from warp_mpm.validation import catalogue, page
+    from warp_mpm.validation.kept import Kept
 
     with refusals():
         if not measured and (data is not None or finer != 1):
@@ -64,22 +68,33 @@ def validate(
             cases = catalogue.chosen(only, quick=quick)
             how = "quick variants" if quick else "full variants"
         kind = page.KINDS["measured" if measured else "known answers"]
-        (out / kind.name).mkdir(parents=True, exist_ok=True)
+        pictures = out / kind.name
+        pictures.mkdir(parents=True, exist_ok=True)
+        kept = Kept(out / f"{kind.name}.json", pictures, asked=f"{how}; {_versions()}", goes_on=resume)
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = 160
     results: list[page.Result] = []
     for case in cases:
-        try:
-            with console.status(f"{case.name} ..."):
-                begin = time.perf_counter()
-                outcome = case.run(quick)
-        except KeyboardInterrupt:
-            complain(f"Interrupted in {case.name}; {len(results)} of {len(cases)} cases are on the page in {out}.")
-            raise typer.Exit(130) from None
-        results.append(page.Result(case, outcome, time.perf_counter() - begin))
-        console.print(f"{case.title}  ({results[-1].seconds:.1f} s)", style="bold")
-        console.print(page.check_table(outcome))
+        result = kept.found(case)
+        if result is None:
+            try:
+                with console.status(f"{case.name} ..."):
+                    begin = time.perf_counter()
+                    outcome = case.run(quick)
+            except KeyboardInterrupt:
+                complain(
+                    f"Interrupted in {case.name}; {len(results)} of {len(cases)} cases are on the page in {out}. "
+                    "The same command with --resume goes on from there."
+                )
+                raise typer.Exit(130) from None
+            seconds = time.perf_counter() - begin
+            with refusals():
+                result = page.Result(case, outcome, seconds, page.draw(case, outcome, pictures))
+                kept.keep(result)
+        results.append(result)
+        console.print(f"{case.title}  ({result.seconds:.1f} s)", style="bold")
+        console.print(page.check_table(result.outcome))
         first = page.everything([result.outcome for result in results]) if measured else None
         with refusals():
             written = page.write(out, results, kind=kind, how=how, versions=_versions(), first=first)

@@ -235,3 +235,5 @@ class Case:
     """Called with True for the quick variant: a coarser or shorter run of the same checks."""
     in_quick: bool = True
     """Whether a quick validation of everything includes it."""
+    module: str = ""
+    """Whose imports decide the numbers; that of `run` unless told."""

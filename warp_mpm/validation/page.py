@@ -76,6 +76,8 @@ class Result:
     case: Case
     outcome: Outcome
     seconds: float
+    pictures: Sequence[tuple[str, str]] = ()
+    """What each shows, and its file in the folder of the page's pictures."""
 
 
 # -- the page ----------------------------------------------------------------------------------------------------
@@ -84,7 +86,7 @@ class Result:
 def write(
     folder: Path, results: Sequence[Result], *, kind: Kind, how: str, versions: str, first: Figure | None = None
 ) -> Path:
-    """Write the page and its pictures into `folder`; returns the page's path.
+    """Write the page into `folder`, beside the pictures of its cases; returns the page's path.
 
     Args:
         folder: of the page.
@@ -94,13 +96,11 @@ def write(
         versions: of what computed it.
         first: picture above all cases.
     """
-    pictures = folder / kind.name
-    pictures.mkdir(parents=True, exist_ok=True)
     lines = [kind.introduction]
     seconds = sum(result.seconds for result in results)
     lines.append(f"Computed with {versions}; {how}, {seconds:.0f} s on one core ({processor()}).\n")
     if first is not None:
-        save(first, pictures / "everything.png")
+        save(first, folder / kind.name / "everything.png")
         lines.append(f"![Everything measured against everything computed]({kind.name}/everything.png)\n")
     lines.append("| case | verdict | largest error over its limit | time |\n| --- | --- | --- | --- |")
     for result in results:
@@ -109,7 +109,7 @@ def write(
             f"{_worst(result.outcome)} | {result.seconds:.0f} s |"
         )
     for result in results:
-        lines += ["", *_section(result, kind, pictures)]
+        lines += ["", *_section(result, kind)]
     page = folder / f"{kind.name}.md"
     write_whole(page, "\n".join(lines) + "\n")
     return page
@@ -120,7 +120,7 @@ def _anchor(title: str) -> str:
     return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
 
 
-def _section(result: Result, kind: Kind, pictures: Path) -> list[str]:
+def _section(result: Result, kind: Kind) -> list[str]:
     case, outcome = result.case, result.outcome
     alone = f"Run alone: `{kind.options}--only {case.name}`."
     lines = [f"## {case.title}", "", case.tests, ""]
@@ -130,12 +130,8 @@ def _section(result: Result, kind: Kind, pictures: Path) -> list[str]:
         lines += [f"Reference: {case.source}. Limit: {case.limit}. {alone}", ""]
     for remark in outcome.remarks:
         lines += [remark, ""]
-    if outcome.panels:
-        save(drawn(outcome.panels), pictures / f"{case.name}.png")
-        lines += [f"![{case.title}]({kind.name}/{case.name}.png)", ""]
-    for name, figure in outcome.pictures.items():
-        save(figure, pictures / f"{case.name}-{name}.png")
-        lines += [f"![{name.replace('-', ' ')}]({kind.name}/{case.name}-{name}.png)", ""]
+    for shows, file in result.pictures:
+        lines += [f"![{shows}]({kind.name}/{file})", ""]
     if outcome.checks:
         lines += ["| | quantity | ours | reference | error | limit |", "| --- | --- | --- | --- | --- | --- |"]
         for check in outcome.checks:
@@ -189,6 +185,18 @@ MOST_LABELS = 6
 """A longer legend stands below its panel, where it hides nothing."""
 
 # -- plots -------------------------------------------------------------------------------------------------------
+
+
+def draw(case: Case, outcome: Outcome, folder: Path) -> list[tuple[str, str]]:
+    """Write a case's pictures into `folder`; returns what each shows and its file there."""
+    written = []
+    if outcome.panels:
+        save(drawn(outcome.panels), folder / f"{case.name}.png")
+        written.append((case.title, f"{case.name}.png"))
+    for name, figure in outcome.pictures.items():
+        save(figure, folder / f"{case.name}-{name}.png")
+        written.append((name.replace("-", " "), f"{case.name}-{name}.png"))
+    return written
 
 
 def drawn(panels: Sequence[Panel]) -> Figure:

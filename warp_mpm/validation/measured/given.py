@@ -37,6 +37,7 @@ def measured_case(
         limit=limit,
         set_before=True,
         run=lambda quick: run(Given(quick, given.finer, given.tables)),
+        module=run.__module__,
     )
 
 
