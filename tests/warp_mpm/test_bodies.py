@@ -174,6 +174,32 @@ def test_walls_stay_in_place_while_the_grid_rides(load_scene):
     assert abs(sample["momentum_residual_x"]) < 1e-9 * abs(sample["momentum_x"])
 
 
+FACES = [
+    pytest.param("case_1", {}, id="rides with the grid"),
+    pytest.param("case_1_fixed", {"gravity.tilt_deg": 5.0}, id="on a slope"),
+    pytest.param("case_1_fixed", {"ground.profile_m": [[-60, 0], [0, 0], [40, -2]]}, id="on a profile"),
+]
+
+
+@pytest.mark.parametrize(("name", "changes"), FACES)
+def test_places_of_a_face_begin_at_its_toe_whatever_the_spacing(load_scene, name, changes):
+    """Friction in the toe's cell hangs on how far from the toe the first place is.
+
+    Laid from the crest down, the first came anywhere within half a cell; the friction on case 1's face then scattered
+    by 5 % from one spacing to the next, its sliding distance by 3 %.
+    """
+    for spacing in (0.5, 0.37, 0.3):
+        scenario = load_scene(name, **changes, **{"numerics.spacing_m": spacing})
+        grid = fit_grid(scenario)
+        bodies = scene_bodies(scenario, grid)
+        places = places_of(bodies, grid, [False] * len(bodies))
+        number = next(k for k, body in enumerate(bodies) if body.name == "barrier")
+        own = (places.body == number) & (places.normal[:, 0] < -0.1) & (places.position[:, 1] > 0.0)
+        along = np.sort(np.hypot(*places.position[own].T)) / spacing
+        assert along[0] == pytest.approx(0.25, abs=0.01)
+        assert np.diff(along) == pytest.approx(0.5, abs=0.02)
+
+
 @pytest.mark.parametrize("height", [0.0, 0.05])
 def test_places_of_one_colour_share_no_node(height):
     """So that threads may do them at the same time; and those that stand alone share a node with none."""

@@ -14,7 +14,7 @@ inclined face and in a corner, and where their body slides, they are joined: the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ from warp_mpm.grid import GridLayout
 from warp_mpm.kernels.layout import BLOCK
 
 from .body import Body, Driven, Sliding
-from .outline import ENDLESS, Segments
+from .outline import ENDLESS, Array, Segments
 
 PER_CELL = 2.0
 """Points of a surface per side of a cell."""
@@ -157,29 +157,26 @@ def _points(
     sideways = not (isinstance(body.motion, Driven) and any(vy for _, vy in body.motion.velocities))
     position, piece = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)]
     for k in np.flatnonzero(wanted):
-        start, end = float(pieces.low[k]), float(pieces.high[k])
-        if end <= start:
-            continue
-        if start <= -ENDLESS and end >= ENDLESS:
-            middle = float((0.5 * (low + high) - pieces.begin[k]) @ pieces.along[k])
-            s = middle + (np.arange(-math.ceil(reach / step), math.ceil(reach / step)) + 0.5) * step
-        elif start <= -ENDLESS:
-            s = end - (np.arange(math.ceil(reach / step)) + 0.5)[::-1] * step
-        elif end >= ENDLESS:
-            s = start + (np.arange(math.ceil(reach / step)) + 0.5) * step
-        else:
-            count = max(1, math.ceil((end - start) / step - 1e-9))
-            s = start + (np.arange(count) + 0.5) * ((end - start) / count)
-        at = pieces.begin[k] + s[:, None] * pieces.along[k]
-        near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
-        if passing:
-            # Anywhere along x, and along y too where it moves that way.
-            near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
-        else:
-            for other in others:
-                near &= other.outline.segments.nearest_within(at, spacing)[0] > -1e-9 * spacing
-        position.append(at[near])
-        piece.append(np.full(int(near.sum()), k, dtype=np.int32))
+        middle = float((0.5 * (low + high) - pieces.begin[k]) @ pieces.along[k])
+        window = (middle - reach, middle + reach)
+        stretches = [(float(pieces.low[k]), float(pieces.high[k]))]
+        if not passing and others:
+
+            def free(s: Array, k: int = k) -> NDArray[np.bool_]:
+                at = pieces.begin[k] + s[:, None] * pieces.along[k]
+                apart = [other.outline.segments.nearest_within(at, spacing)[0] for other in others]
+                return np.asarray(np.min(apart, axis=0) > -1e-9 * spacing)
+
+            stretches = _free_stretches(stretches[0], window, step, free)
+        for stretch in stretches:
+            s = _laid(stretch, window, step)
+            at = pieces.begin[k] + s[:, None] * pieces.along[k]
+            near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
+            if passing:
+                # Anywhere along x, and along y too where it moves that way.
+                near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
+            position.append(at[near])
+            piece.append(np.full(int(near.sum()), k, dtype=np.int32))
     places, of = np.concatenate(position), np.concatenate(piece)
     count = len(of)
     return Places(
@@ -191,6 +188,42 @@ def _points(
         of,
         np.full(count, number, dtype=np.int32),
     )
+
+
+def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> Array:
+    """Places along a piece, a step apart, the first and last half a step from its ends; within the window where it has
+    none."""
+    start, end = stretch
+    if start <= -ENDLESS and end >= ENDLESS:
+        middle = 0.5 * (window[0] + window[1])
+        half = math.ceil(0.5 * (window[1] - window[0]) / step)
+        return middle + (np.arange(-half, half) + 0.5) * step
+    if start <= -ENDLESS:
+        return end - (np.arange(math.ceil(max(end - window[0], 0.0) / step)) + 0.5)[::-1] * step
+    if end >= ENDLESS:
+        return start + (np.arange(math.ceil(max(window[1] - start, 0.0) / step)) + 0.5) * step
+    count = max(1, math.ceil((end - start) / step - 1e-9)) if end > start else 0
+    return start + (np.arange(count) + 0.5) * ((end - start) / max(count, 1))
+
+
+def _free_stretches(
+    whole: tuple[float, float], window: tuple[float, float], step: float, free: Callable[[Array], NDArray[np.bool_]]
+) -> list[tuple[float, float]]:
+    """Where along a piece no other body is. Places are laid from there: friction in the cell of a barrier's toe depends
+    on how far from the toe the first one is, and would scatter with the spacing if that did."""
+    start, end = max(whole[0], window[0]), min(whole[1], window[1])
+    if end <= start:
+        return []
+    s = np.linspace(start, end, max(3, math.ceil(4.0 * (end - start) / step) + 1))
+    is_free = free(s)
+    turns = np.flatnonzero(is_free[1:] != is_free[:-1])
+    inside, outside = np.where(is_free[turns], s[turns + 1], s[turns]), np.where(is_free[turns], s[turns], s[turns + 1])
+    for _ in range(60):
+        between = 0.5 * (inside + outside)
+        at_free = free(between)
+        outside, inside = np.where(at_free, between, outside), np.where(at_free, inside, between)
+    ends = [*([whole[0]] if is_free[0] else []), *outside, *([whole[1]] if is_free[-1] else [])]
+    return list(zip(map(float, ends[::2]), map(float, ends[1::2]), strict=True))
 
 
 def by_block(places: Places, grid: GridLayout) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.int32]]:
