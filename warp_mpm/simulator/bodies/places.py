@@ -14,7 +14,7 @@ inclined face and in a corner, and where their body slides, they are joined: the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -161,13 +161,7 @@ def _points(
         window = (middle - reach, middle + reach)
         stretches = [(float(pieces.low[k]), float(pieces.high[k]))]
         if not passing and others:
-
-            def free(s: Array, k: int = k) -> NDArray[np.bool_]:
-                at = pieces.begin[k] + s[:, None] * pieces.along[k]
-                apart = [other.outline.segments.nearest_within(at, spacing)[0] for other in others]
-                return np.asarray(np.min(apart, axis=0) > -1e-9 * spacing)
-
-            stretches = _free_stretches(stretches[0], window, step, free)
+            stretches = _free_stretches(pieces.begin[k], pieces.along[k], stretches[0], window, grid, others)
         for stretch in stretches:
             s = _laid(stretch, window, step)
             at = pieces.begin[k] + s[:, None] * pieces.along[k]
@@ -190,39 +184,49 @@ def _points(
     )
 
 
-def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> Array:
+def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> NDArray[Any]:
     """Places along a piece, a step apart, the first and last half a step from its ends; within the window where it has
     none."""
     start, end = stretch
-    if start <= -ENDLESS and end >= ENDLESS:
-        middle = 0.5 * (window[0] + window[1])
-        half = math.ceil(0.5 * (window[1] - window[0]) / step)
-        return middle + (np.arange(-half, half) + 0.5) * step
-    if start <= -ENDLESS:
-        return end - (np.arange(math.ceil(max(end - window[0], 0.0) / step)) + 0.5)[::-1] * step
-    if end >= ENDLESS:
-        return start + (np.arange(math.ceil(max(window[1] - start, 0.0) / step)) + 0.5) * step
-    count = max(1, math.ceil((end - start) / step - 1e-9)) if end > start else 0
-    return start + (np.arange(count) + 0.5) * ((end - start) / max(count, 1))
+    begins, stops = start > -ENDLESS, end < ENDLESS
+    length = (end if stops else window[1]) - (start if begins else window[0])
+    if length <= 0.0:
+        return np.zeros(0)
+    count = max(1, math.ceil(length / step - 1e-9))
+    places: NDArray[Any] = (np.arange(count) + 0.5) * (length / count if begins and stops else step)
+    if begins:
+        return start + places
+    return (end - places)[::-1] if stops else window[0] + places
 
 
 def _free_stretches(
-    whole: tuple[float, float], window: tuple[float, float], step: float, free: Callable[[Array], NDArray[np.bool_]]
+    begin: Array,
+    along: Array,
+    whole: tuple[float, float],
+    window: tuple[float, float],
+    grid: GridLayout,
+    others: Sequence[Body],
 ) -> list[tuple[float, float]]:
     """Where along a piece no other body is. Places are laid from there: friction in the cell of a barrier's toe depends
     on how far from the toe the first one is, and would scatter with the spacing if that did."""
+
+    def free(s: NDArray[Any]) -> NDArray[np.bool_]:
+        at = begin + s[:, None] * along
+        apart = [other.outline.segments.nearest_within(at, grid.spacing)[0] for other in others]
+        return np.asarray(np.min(apart, axis=0) > -1e-9 * grid.spacing)
+
     start, end = max(whole[0], window[0]), min(whole[1], window[1])
     if end <= start:
         return []
-    s = np.linspace(start, end, max(3, math.ceil(4.0 * (end - start) / step) + 1))
+    s = np.linspace(start, end, max(3, math.ceil(4.0 * PER_CELL * (end - start) / grid.spacing) + 1))
     is_free = free(s)
     turns = np.flatnonzero(is_free[1:] != is_free[:-1])
-    inside, outside = np.where(is_free[turns], s[turns + 1], s[turns]), np.where(is_free[turns], s[turns], s[turns + 1])
+    occupied, open_ = np.where(is_free[turns], s[turns + 1], s[turns]), np.where(is_free[turns], s[turns], s[turns + 1])
     for _ in range(60):
-        between = 0.5 * (inside + outside)
+        between = 0.5 * (occupied + open_)
         at_free = free(between)
-        outside, inside = np.where(at_free, between, outside), np.where(at_free, inside, between)
-    ends = [*([whole[0]] if is_free[0] else []), *outside, *([whole[1]] if is_free[-1] else [])]
+        open_, occupied = np.where(at_free, between, open_), np.where(at_free, occupied, between)
+    ends = [*([whole[0]] if is_free[0] else []), *open_, *([whole[1]] if is_free[-1] else [])]
     return list(zip(map(float, ends[::2]), map(float, ends[1::2]), strict=True))
 
 
