@@ -99,6 +99,11 @@ def test_commands_of_the_pages_exist():
     assert seen > 100
 
 
+def test_the_page_of_the_commands_has_a_row_for_each():
+    rows = re.findall(r"^\| `([a-z-]+)", (ROOT / "docs/commands.md").read_text(), re.MULTILINE)
+    assert {*COMMAND_LINES["warp_mpm"].commands} <= {*rows}
+
+
 def test_options_and_pictures_that_the_prose_names_exist():
     options = {
         option for line in COMMAND_LINES.values() for one in with_commands_of(line) for option in options_of(one)
