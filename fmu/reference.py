@@ -1,8 +1,8 @@
 """Reference results that ship inside the archives, in the layout of the FMI cross-check rules.
 
-`{unit}_in.csv` holds the inputs over time, `{unit}_ref.csv` the outputs at every communication point and
-`{unit}_ref.opt` the settings of the run. Names are quoted as in the XML, time comes first. A unit that can be driven
-in another way has more of them, `{unit}_{way}_in.csv` and so on, and with them `{unit}_{way}_start.csv`, the start
+``{unit}_in.csv`` holds the inputs over time, ``{unit}_ref.csv`` the outputs at every communication point and
+``{unit}_ref.opt`` the settings of the run. Names are quoted as in the XML, time comes first. A unit that can be driven
+in another way has more of them, ``{unit}_{way}_in.csv`` and so on, and with them ``{unit}_{way}_start.csv``, the start
 values that differ.
 """
 
@@ -72,7 +72,7 @@ def base_of(name: str) -> str:
 
 
 def files(interface: Interface) -> dict[str, bytes]:
-    """The reference files of a unit by name; none for the simulator's, see `simulated_files`."""
+    """The reference files of a unit by name; none for the simulator's, see ``simulated_files``."""
     found: dict[str, bytes] = {}
     for way, case in _CASES.get(base_of(interface.name), {}).items():
         slave = case.slave(instance_name="reference", resources="")
@@ -86,10 +86,11 @@ def files(interface: Interface) -> dict[str, bytes]:
 
 
 def simulated_files(resources: Path) -> dict[str, bytes]:
-    """The reference files of `DebrisFlow` with the scenario in `resources`.
+    """The reference files of ``DebrisFlow`` with the scenario in ``resources``.
 
-    Raises:
-        UnitError: the simulator cannot run it.
+    Raises
+    ------
+    UnitError: the simulator cannot run it.
     """
     slave = debris_flow.DebrisFlowSlave(instance_name="reference", resources=str(resources))
     still = {v.name: 0.0 for v in debris_flow.INTERFACE.of("input")}
