@@ -121,6 +121,15 @@ def test_scenes_of_the_papers_figures_exist():
     assert all((ROOT / "scenarios" / f"{run}.json").exists() for run in runs)
 
 
+def test_every_row_belongs_to_a_table():
+    """A blank line in a table leaves what follows it as bare text."""
+    for page in WRITTEN:
+        lines = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE).splitlines()
+        for before, line, after in zip(["", *lines], lines, [*lines[1:], ""], strict=False):
+            if line.startswith("|") and not before.startswith("|"):
+                assert re.fullmatch(r"\|[ :|-]+", after), (page.name, line[:60])
+
+
 def test_navigation_leads_to_pages():
     """A page that is left out of it, the build tells of."""
     navigation = (ROOT / "docs/site/mkdocs.yml").read_text().split("\nnav:\n")[1]
