@@ -4,15 +4,23 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
+# An environment that was left half made, as where Debian's python3-venv is missing, or made by an older Python would stay
+# in the way for good: it is made anew.
+FITS := 'import sys; sys.exit(sys.version_info < (3, 11))'
+ENVIRONMENT = { $(BIN)/python -c $(FITS) && $(BIN)/python -c 'import pip'; } 2>/dev/null || { \
+	$(PYTHON) -c $(FITS) 2>/dev/null || \
+	{ echo "$(PYTHON) is not there or older than Python 3.11; name a newer one: make PYTHON=python3.12" >&2; exit 2; }; \
+	$(PYTHON) -m venv --clear $(VENV); }
+
 .PHONY: run test test-browser coverage lint validate accuracy docs fmus clean
 
 $(VENV)/.run: pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(ENVIRONMENT)
 	$(BIN)/pip install --quiet --editable .
 	touch $@
 
 $(VENV)/.test: pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(ENVIRONMENT)
 	$(BIN)/pip install --quiet --editable '.[test]'
 	touch $@ $(VENV)/.run
 
@@ -58,5 +66,5 @@ test-browser: $(VENV)/.test   # needs Chromium: Debian's, or CHROMIUM=path
 	$(BIN)/pip install --quiet --editable '.[browser]'
 	$(BIN)/python -m pytest tests/warp_mpm/browser_report.py
 
-clean:
-	rm -rf runs build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+clean: # what was built; runs stay
+	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

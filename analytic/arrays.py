@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """An impact at given times; every array has the shape of ``time``. SI units per metre of width."""
+    """An impact at given times; every array has the shape of `time`. SI units per metre of width."""
 
     time: Array
     force: Array
@@ -31,9 +31,9 @@ class Trajectory:
 
 
 def trajectory(impact: Impact, time: ArrayLike) -> Trajectory:
-    """Evaluate ``impact`` at the times ``time`` [s], an array of any shape.
+    """Evaluate `impact` at the times `time` [s], an array of any shape.
 
-    The values equal those of the methods of ``Impact``, which see for their meaning.
+    The values equal those of the methods of `Impact`, which see for their meaning.
     """
     times = np.asarray(time, dtype=float)
     since = times - impact.arrival_time
@@ -107,12 +107,11 @@ def outcomes(
 ) -> Outcomes:
     """Outcome of each of many impacts; the inputs broadcast against each other.
 
-    Inputs have the meaning, unit and range they have in ``Impact``; an infinite ``barrier_mass`` is a fixed barrier.
+    Inputs have the meaning, unit and range they have in `Impact`; an infinite `barrier_mass` is a fixed barrier.
     The barrier is at rest before the impact. A million impacts take a fraction of a second.
 
-    Raises
-    ------
-    ValueError: an input is out of its range, or the variant is unknown; one sentence names the first bad value.
+    Raises:
+        ValueError: an input is out of its range, or the variant is unknown; one sentence names the first bad value.
     """
     if variant not in VARIANTS:
         raise ValueError(f"variant is {variant!r}, it must be one of {', '.join(VARIANTS)}.")
@@ -160,7 +159,7 @@ def outcomes(
 def _momentum_closed_impulse(
     m1: Array, m2: Array, v: Array, T2: Array, tau: Array, deceleration: Array, R: Array
 ) -> Array:
-    """Impulse that leaves both bodies with one velocity at T2, see ``Impact``."""
+    """Impulse that leaves both bodies with one velocity at T2, see `Impact`."""
     reduced = m1 / (1 + m1 / m2)
     A = reduced * (v + deceleration * T2)
     finite_R = np.where(np.isinf(R), 0.0, R)

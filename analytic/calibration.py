@@ -2,9 +2,9 @@
 
 Plain arrays in, so that the history may come from the simulator, a flume or the field. Two rules:
 
-``peak``
+`peak`
     The paper's (section 3.2): s1max from the peak force by Eqs. (5) and (7), tau = T1 / T2 from its time.
-``least_squares``
+`least_squares`
     The triangle that is nearest to F(t), in the mean square from arrival to the end of the impact.
 
 A peak is a matter of filtering, and so are lambda and tau. Here the force is smoothed by a moving mean whose length is
@@ -63,10 +63,10 @@ class Measured:
     end_time: float
     """Time after which the filtered force stays within 10 % of the peak above the residual force [s]."""
     over: bool
-    """Whether the impact ends within the record, by the rule of the simulator's summary: ``end_time`` lies before its
+    """Whether the impact ends within the record, by the rule of the simulator's summary: `end_time` lies before its
     last tenth, and by then the force has settled. It has not where the residual force is above 5 % of the peak and, at
     the rate of its last change, would change by more than 10 % of the peak in as long as the impact has lasted. Then a
-    longer record shows a later end, and ``duration`` and ``impulse`` are bounds from below."""
+    longer record shows a later end, and `duration` and `impulse` are bounds from below."""
     impulse: float
     """Integral of the force from arrival to end [N s/m]."""
     residual_force: float
@@ -86,7 +86,7 @@ class Measured:
 
     @property
     def warning(self) -> str | None:
-        """One sentence where the impact is not over at the end of the record, else ``None``."""
+        """One sentence where the impact is not over at the end of the record, else `None`."""
         if self.rises:
             return "the force still rises at the end of the record"
         if self.over:
@@ -110,16 +110,14 @@ class Measured:
 def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> Measured:
     """Peak, times and impulse of a force history, which may end at any moment of the impact.
 
-    Parameters
-    ----------
-    time: ends of the sampling intervals [s], increasing; the first is the start of the record.
-    force: mean force over the interval that ends then [N/m].
-    filter_window: length of the moving mean [s] >= 0; 0 leaves the force as it is.
+    Args:
+        time: ends of the sampling intervals [s], increasing; the first is the start of the record.
+        force: mean force over the interval that ends then [N/m].
+        filter_window: length of the moving mean [s] >= 0; 0 leaves the force as it is.
 
-    Raises
-    ------
-    NoImpactError: the force is never above nil.
-    CalibrationError: the arrays do not fit together, hold no number, or fewer than three samples.
+    Raises:
+        NoImpactError: the force is never above nil.
+        CalibrationError: the arrays do not fit together, hold no number, or fewer than three samples.
     """
     time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
     if time.ndim != 1 or time.shape != force.shape:
@@ -159,7 +157,7 @@ class Calibration:
     """A closed form fitted to a force history."""
 
     rule: str
-    """One of ``RULES``."""
+    """One of `RULES`."""
     s1max: float
     """[m], as the rule gives it."""
     geometry_change: float
@@ -167,9 +165,9 @@ class Calibration:
     rise_ratio: float
     """tau = T1 / T2 [-], as the rule gives it."""
     within_range: bool
-    """Whether s1max <= L_1,0 and tau <= 1; if not, ``impact`` uses the nearest values that are."""
+    """Whether s1max <= L_1,0 and tau <= 1; if not, `impact` uses the nearest values that are."""
     vertical_load_ratio: float
-    """kappa [-] of ``impact``."""
+    """kappa [-] of `impact`."""
     impact: Impact
     """The closed form on the clock of the record."""
     measured: Measured
@@ -184,18 +182,16 @@ def calibrate(
     filter_window: float = FILTER_WINDOW,
     vertical_load_ratio: float = 0.0,
 ) -> Calibration:
-    """Fit s1max and tau of the variant ``stick_slip`` to a force history.
+    """Fit s1max and tau of the variant `stick_slip` to a force history.
 
-    Parameters
-    ----------
-    time, force, filter_window: as in ``measure``.
-    scene: masses, length and speed of the flow, and the barrier.
-    rule: one of ``RULES``.
-    vertical_load_ratio: kappa of the closed form; it moves the barrier, not the force.
+    Args:
+        time, force, filter_window: as in `measure`.
+        scene: masses, length and speed of the flow, and the barrier.
+        rule: one of `RULES`.
+        vertical_load_ratio: kappa of the closed form; it moves the barrier, not the force.
 
-    Raises
-    ------
-    CalibrationError: the history holds no impact, or ends before its peak, or the rule is unknown.
+    Raises:
+        CalibrationError: the history holds no impact, or ends before its peak, or the rule is unknown.
     """
     if rule not in RULES:
         raise CalibrationError(f"rule is {rule!r}, it must be one of {', '.join(RULES)}.")
@@ -241,7 +237,7 @@ class WindowOf:
     peak_force: float
     """That belongs to it [N/m]."""
     window: float | None
-    """Length of the longest moving mean whose peak is as great [s]; ``None`` where none is, nor a single record."""
+    """Length of the longest moving mean whose peak is as great [s]; `None` where none is, nor a single record."""
     largest_force: float
     """Greatest record of the history [N/m]."""
 
@@ -265,11 +261,10 @@ def window_of(geometry_change: float, time: Array, force: Array, scene: Scene) -
 
     The peak of the mean falls as it gets longer, so that each lambda has one window, or none.
 
-    Parameters
-    ----------
-    geometry_change: lambda.
-    time, force: as in ``measure``.
-    scene: masses, length and speed of the flow, and the barrier.
+    Args:
+        geometry_change: lambda.
+        time, force: as in `measure`.
+        scene: masses, length and speed of the flow, and the barrier.
     """
     time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
     needed = 0.75 * _reduced_mass(scene) * scene.speed**2 / (geometry_change * scene.flow_length)
@@ -325,15 +320,13 @@ def measured_vertical_load_ratio(
 ) -> float:
     """kappa [-]: vertical load of the flow on the barrier over its horizontal force, as impulses over the impact.
 
-    Parameters
-    ----------
-    time [s], force [N/m]: as in ``measure``.
-    base_normal_force: force with which the barrier presses on its base, mean over the interval [N/m].
-    weight: with which the barrier alone presses on its base [N/m].
+    Args:
+        time [s], force [N/m]: as in `measure`.
+        base_normal_force: force with which the barrier presses on its base, mean over the interval [N/m].
+        weight: with which the barrier alone presses on its base [N/m].
 
-    Raises
-    ------
-    CalibrationError: the force pulls more than it pushes.
+    Raises:
+        CalibrationError: the force pulls more than it pushes.
     """
     inside = (time > measured.arrival_time) & (time <= measured.end_time)
     widths = np.diff(time, prepend=time[0])[inside]
@@ -348,7 +341,7 @@ def measured_vertical_load_ratio(
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a closed form is from a record, as root mean squares; ``None`` where the record is silent."""
+    """How far a closed form is from a record, as root mean squares; `None` where the record is silent."""
 
     force: float
     """Root mean square over the measured impact, over the measured peak force [-]."""
@@ -361,7 +354,7 @@ class Misfit:
 
 
 def misfit(impact: Impact, series: Mapping[str, Array], measured: Measured) -> Misfit:
-    """Distance of ``impact`` from a record (columns as in ``analytic.time_series``)."""
+    """Distance of `impact` from a record (columns as in `analytic.time_series`)."""
     time = series["time"]
     curves = trajectory(impact, time)
     since_arrival = time > measured.arrival_time
@@ -387,7 +380,7 @@ def _root_mean_square(values: Array) -> float:
 
 @dataclass(frozen=True)
 class KeyFigures:
-    """The quantities of the paper's Figs. 13 and 14, SI units per metre of width; ``None``: not recorded."""
+    """The quantities of the paper's Figs. 13 and 14, SI units per metre of width; `None`: not recorded."""
 
     peak_force: float
     rise_time: float | None
@@ -416,7 +409,7 @@ def key_figures(impact: Impact) -> KeyFigures:
 
 
 def measured_key_figures(series: Mapping[str, Array], measured: Measured | None) -> KeyFigures:
-    """Key figures of a record (columns as in ``analytic.time_series``); ``measured`` is None where there is no impact
+    """Key figures of a record (columns as in `analytic.time_series`); `measured` is None where there is no impact
     in it."""
 
     def largest(name: str) -> float | None:

@@ -25,7 +25,7 @@ MASS_RATIOS = (1e-3, 1e4)
 
 
 Rule = Callable[[Scene], Coefficients]
-"""Gives the coefficients of a scene; constant ones or ``analytic.fitted.coefficients``."""
+"""Gives the coefficients of a scene; constant ones or `analytic.fitted.coefficients`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,7 @@ class Design:
     displacement: float
     """Final displacement [m]."""
     governed_by: str
-    """``displacement``: a lighter barrier would slide too far; ``shape``: it would be too narrow at the crest."""
+    """`displacement`: a lighter barrier would slide too far; `shape`: it would be too narrow at the crest."""
     coefficients: Coefficients
 
 
@@ -80,7 +80,7 @@ class DesignError(ValueError):
 
 
 def displacement(scene: Scene, barrier_mass: ArrayLike, coefficients: Coefficients) -> Array:
-    """Final displacement [m] of barriers of the masses ``barrier_mass`` [kg/m] in the flow of ``scene``."""
+    """Final displacement [m] of barriers of the masses `barrier_mass` [kg/m] in the flow of `scene`."""
     if scene.base_friction is None:
         raise DesignError("base_friction is missing, a barrier that may slide needs a number in [0, inf).")
     return outcomes(
@@ -99,13 +99,12 @@ def displacement(scene: Scene, barrier_mass: ArrayLike, coefficients: Coefficien
 
 
 def lightest_barrier(scene: Scene, limit: float, bounds: Bounds, rule: Rule = lambda scene: Coefficients()) -> Design:
-    """The lightest trapezoid within ``bounds`` that the flow of ``scene`` moves at most ``limit`` [m].
+    """The lightest trapezoid within `bounds` that the flow of `scene` moves at most `limit` [m].
 
     Of equally light ones, the one with the flattest face. The scene's own barrier mass is not used.
 
-    Raises
-    ------
-    DesignError: the limit is no number of at least 0, or no barrier keeps it.
+    Raises:
+        DesignError: the limit is no number of at least 0, or no barrier keeps it.
     """
     if not (math.isfinite(limit) and limit >= 0):
         raise DesignError(f"limit is {limit:g}, it must be a number in [0, inf).")
@@ -123,7 +122,7 @@ def lightest_barrier(scene: Scene, limit: float, bounds: Bounds, rule: Rule = la
 def _lightest_at(
     angle: float, scene: Scene, limit: float, bounds: Bounds, rule: Rule, lighter_than: float
 ) -> Design | None:
-    """The lightest one of a face angle [degrees]; none where it is not lighter than ``lighter_than`` [kg/m]."""
+    """The lightest one of a face angle [degrees]; none where it is not lighter than `lighter_than` [kg/m]."""
     narrowest = bounds.density * bounds.height * (bounds.crest_width + _run(angle, bounds))
 
     def moved(mass: float) -> tuple[float, Coefficients]:
@@ -156,9 +155,9 @@ def _run(angle: float, bounds: Bounds) -> float:
 
 
 def trapezoid(mass: float, bounds: Bounds) -> tuple[float, float, float, float]:
-    """B, b, H [m] and beta [degrees] of a barrier of the mass ``mass`` [kg/m], with the flattest face that is possible.
+    """B, b, H [m] and beta [degrees] of a barrier of the mass `mass` [kg/m], with the flattest face that is possible.
 
-    Where no shape within ``bounds`` is so light, the lightest one, which is heavier.
+    Where no shape within `bounds` is so light, the lightest one, which is heavier.
     """
     low, high = bounds.face_angle
     spare = mass / (bounds.density * bounds.height) - bounds.crest_width  # room for the face's horizontal length
@@ -169,7 +168,7 @@ def trapezoid(mass: float, bounds: Bounds) -> tuple[float, float, float, float]:
 
 
 def chart(scene: Scene, mass_ratio: Array, speed: Array, rule: Rule = lambda scene: Coefficients()) -> Array:
-    """Final displacement [m] over mass ratio m2 / m1 [columns] and speed [m/s, rows], all else as in ``scene``."""
+    """Final displacement [m] over mass ratio m2 / m1 [columns] and speed [m/s, rows], all else as in `scene`."""
     found = np.empty((len(speed), len(mass_ratio)))
     for i, v in enumerate(speed):
         for j, ratio in enumerate(mass_ratio):

@@ -1,6 +1,6 @@
 """Published formulas for the peak impact pressure on a fixed barrier, with how sure this project is of each.
 
-A formula that could not be checked against its source carries ``Confidence.UNVERIFIED``: it is off unless asked for,
+A formula that could not be checked against its source carries `Confidence.UNVERIFIED`: it is off unless asked for,
 and a coefficient that is not known has to come from the user. Symbols: rho density [kg/m^3], v speed [m/s], h depth
 [m], g gravity [m/s^2], Fr = v / sqrt(g h).
 """
@@ -43,7 +43,7 @@ class EmpiricalModel:
     formula: str
     """As text, with the coefficients' names."""
     coefficients: Mapping[str, float | None]
-    """``None``: not known, the user has to give it."""
+    """`None`: not known, the user has to give it."""
     source: str
     range: str
     """Range of the experiments or of the argument."""
@@ -65,9 +65,8 @@ class EmpiricalModel:
     def with_coefficients(self, **coefficients: float) -> EmpiricalModel:
         """The model with the user's coefficients.
 
-        Raises
-        ------
-        ValueError: a coefficient is unknown or not a finite number.
+        Raises:
+            ValueError: a coefficient is unknown or not a finite number.
         """
         for key, value in coefficients.items():
             if key not in self.coefficients:
@@ -82,9 +81,8 @@ class EmpiricalModel:
     ) -> Array:
         """Peak pressure [Pa] for a density [kg/m^3], speed [m/s] and depth [m], which broadcast.
 
-        Raises
-        ------
-        ValueError: a coefficient is not known, or an input is not a positive finite number.
+        Raises:
+            ValueError: a coefficient is not known, or an input is not a positive finite number.
         """
         missing = [key for key, value in self.coefficients.items() if value is None]
         if missing:
@@ -142,7 +140,7 @@ def reflected_depth_ratio(froude: ArrayLike) -> Array:
     """Depth of a bore reflected by a wall over the depth of the flow [-].
 
     The root x > 1 of (x - 1)^2 (x + 1) = 2 Fr^2 x: mass and momentum balance across the bore that leaves a wall which
-    stops a flow of the Froude number ``froude``.
+    stops a flow of the Froude number `froude`.
     """
     fr = np.asarray(froude, dtype=float)
     # Newton from above: the cubic x^3 - x^2 - (1 + 2 Fr^2) x + 1 is convex there, so the steps go down to the root.
@@ -267,13 +265,12 @@ MODELS: Mapping[str, EmpiricalModel] = {
 def select(
     names: Sequence[str] = (), coefficients: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 ) -> list[EmpiricalModel]:
-    """The models called ``names`` with the user's ``coefficients`` by model name; by default those on by default.
+    """The models called `names` with the user's `coefficients` by model name; by default those on by default.
 
     A model for which coefficients are given takes part whether or not it is on by default.
 
-    Raises
-    ------
-    ValueError: a name is unknown, or a model still lacks a coefficient.
+    Raises:
+        ValueError: a name is unknown, or a model still lacks a coefficient.
     """
     for name in [*names, *coefficients]:
         if name not in MODELS:

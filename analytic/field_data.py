@@ -1,6 +1,6 @@
 """Measured impact events: reading a table of them, and how well each pressure model meets them.
 
-The field data of the paper (139 events of the Jiangjia Ravine) are not public. ``synthetic_events`` generates a set to
+The field data of the paper (139 events of the Jiangjia Ravine) are not public. `synthetic_events` generates a set to
 the published ranges; wherever it appears it is marked SYNTHETIC.
 """
 
@@ -47,7 +47,7 @@ SHOWN_PROBLEMS = 10
 
 
 class FieldDataError(ValueError):
-    """A table of events that cannot be used. ``problems`` holds one sentence for each."""
+    """A table of events that cannot be used. `problems` holds one sentence for each."""
 
     def __init__(self, path: Path, problems: Sequence[str]):
         shown = list(problems[:SHOWN_PROBLEMS])
@@ -75,13 +75,12 @@ class Events:
 def read_events(path: str | Path) -> Events:
     """Read a CSV table of events.
 
-    Lines before the header may begin with ``#``; if one says SYNTHETIC, the set is taken as generated. The header
-    names the columns with their units, ``density [kg/m3],speed [m/s],height [m],peak_pressure [kPa]``; other columns
+    Lines before the header may begin with `#`; if one says SYNTHETIC, the set is taken as generated. The header
+    names the columns with their units, `density [kg/m3],speed [m/s],height [m],peak_pressure [kPa]`; other columns
     are ignored. Commas, semicolons or tabs separate; numbers have a decimal point.
 
-    Raises
-    ------
-    FieldDataError: the file, its header or a row is wrong; one sentence for each problem.
+    Raises:
+        FieldDataError: the file, its header or a row is wrong; one sentence for each problem.
     """
     path = Path(path)
     try:
@@ -201,7 +200,7 @@ class Agreement:
 
 
 def agreement(model: EmpiricalModel, events: Events) -> Agreement:
-    """How well ``model`` meets ``events``."""
+    """How well `model` meets `events`."""
     computed = model.pressure(events.density, events.speed, events.height)
     measured = events.peak_pressure
     ratio = computed / measured
@@ -250,7 +249,7 @@ def _lognormal(mean: float, sigma: float, normal: Array) -> Array:
 
 
 def write_events(events: Events, path: str | Path, remarks: Iterable[str] = ()) -> None:
-    """Write a table that ``read_events`` reads; a synthetic set says so in its first line."""
+    """Write a table that `read_events` reads; a synthetic set says so in its first line."""
     marks = [f"{SYNTHETIC}: generated, not measured."] if events.synthetic else []
     lines = [f"# {line}" for line in [*marks, *remarks]]
     lines.append("density [kg/m3],speed [m/s],height [m],peak_pressure [kPa]")

@@ -1,15 +1,15 @@
-"""The variant ``calibrated``: the closed form's numbers as functions of the scene, fitted to simulations.
+"""The variant `calibrated`: the closed form's numbers as functions of the scene, fitted to simulations.
 
 The paper takes lambda for a constant, 0.72 fixed and 0.41 sliding, and leaves the vertical load out. A sweep of
-simulations (``analytic.sweep``) says instead
+simulations (`analytic.sweep`) says instead
 
     F_peak = (a (1 - cos beta) + b / Fr^2) M^c rho h v^2,     M = m2 / (m1 + m2), 1 where the barrier is fixed
     T1     = t (L/h)^p (1 - cos beta)^q h / v
     kappa  = cot(beta)
 
 The bracket is a jet that the face turns by beta, and the weight of the flow; a smooth face passes on its normal force
-alone, hence kappa. With the impulse J of the variant ``momentum_closed``, lambda and tau follow: T2 = 2 J / F_peak,
-lambda = 3 v T2 / (8 L), tau = T1 / T2. ``docs/closed_form.md`` tells how well this does on scenes that were not fitted.
+alone, hence kappa. With the impulse J of the variant `momentum_closed`, lambda and tau follow: T2 = 2 J / F_peak,
+lambda = 3 v T2 / (8 L), tau = T1 / T2. `docs/closed_form.md` tells how well this does on scenes that were not fitted.
 Standard library only.
 """
 
@@ -26,7 +26,7 @@ CALIBRATED = "calibrated"
 """Name of the variant."""
 
 BASE_VARIANT = "momentum_closed"
-"""Variant of ``Impact`` for which the constants are fitted."""
+"""Variant of `Impact` for which the constants are fitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,11 +40,11 @@ class Coefficients:
     vertical_load_ratio: float = 0.0
     """kappa [-]."""
     variant: str = "stick_slip"
-    """Variant of ``Impact``."""
+    """Variant of `Impact`."""
 
     @property
     def model(self) -> dict[str, Any]:
-        """As arguments of ``Scene.impact``."""
+        """As arguments of `Scene.impact`."""
         return dict(self.__dict__)
 
 
@@ -74,7 +74,7 @@ CONSTANTS = {
         jet=1.228, weight=0.812, mass_exponent=0.000, rise=0.220, rise_length_exponent=0.595, rise_angle_exponent=-1.558
     ),
 }
-"""Fitted by ``python -m analytic sweep fit docs/data/sweep.csv``."""
+"""Fitted by `python -m analytic sweep fit docs/data/sweep.csv`."""
 
 FITTED_RANGES = {
     "froude_number": ("Fr", 1.0, 5.0),
@@ -91,13 +91,12 @@ GREATEST_FRICTION_SHARE = 0.95
 
 
 def coefficients(scene: Scene, constants: Constants | None = None) -> Coefficients:
-    """The fitted numbers of a scene; ``constants`` other than the fitted ones serve the fit itself.
+    """The fitted numbers of a scene; `constants` other than the fitted ones serve the fit itself.
 
     lambda and tau are cut off at 1.
 
-    Raises
-    ------
-    ValueError: the scene's face angle is not known.
+    Raises:
+        ValueError: the scene's face angle is not known.
     """
     if scene.face_angle is None or not 0 < scene.face_angle <= 90:
         raise ValueError(f"face_angle is {scene.face_angle}, the calibrated variant needs a number in (0, 90] degrees.")
@@ -124,7 +123,7 @@ def coefficients(scene: Scene, constants: Constants | None = None) -> Coefficien
 
 
 def _impulse(scene: Scene, peak_force: float, rise_time: float, kappa: float) -> float:
-    """Impulse [N s/m] of ``momentum_closed`` for a given peak force and rise time, instead of a given duration.
+    """Impulse [N s/m] of `momentum_closed` for a given peak force and rise time, instead of a given duration.
 
     With T2 = 2 J / F its equation reads J (1/m1 + (1 - 2 R/F + tau R^2/F^2) / m) = v, where m is the driven mass and R
     the threshold force; and tau = T1 / T2 makes it linear in J again. tau is at most 1.
@@ -148,7 +147,7 @@ def _impulse(scene: Scene, peak_force: float, rise_time: float, kappa: float) ->
 
 
 def calibrated_impact(scene: Scene, **model: Any) -> Impact:
-    """The impact with the fitted numbers; ``model`` holds what else ``Scene.impact`` takes."""
+    """The impact with the fitted numbers; `model` holds what else `Scene.impact` takes."""
     return scene.impact(**{**coefficients(scene).model, **model})
 
 

@@ -5,20 +5,20 @@ force F(t) that rises linearly from nil to F_peak at T1 and falls linearly to ni
 slides on its base against the friction R = m2 g tan(delta_b), on a slope of the angle theta against what its weight
 leaves of it, R = m2 g (tan(delta_b) cos(theta) - sin(theta)). Three variants answer for its motion:
 
-``stick_slip``
+`stick_slip`
     The consistent one and the default. The barrier holds still until F exceeds R, slides, and stops when its velocity
     is spent, be that before or after T2.
-``momentum_closed``
+`momentum_closed`
     As above, with the impulse raised until flow and barrier have one common velocity at T2 although friction acts
     meanwhile. It raises F_peak, so a geometry change calibrated for another variant does not carry over.
-``as_printed``
+`as_printed`
     The paper's Eqs. (10)-(16) to the letter, for comparison only: friction drags a resting barrier backwards, the
     velocity jumps at T2, and the kinematics ignore the rise ratio.
 
 All quantities are SI per metre of width. Every function of time is evaluated from a polynomial of at most third degree
 in the time since its phase began: there is no time step and no integration error. Equation numbers are the paper's;
-``docs/closed_form.md`` derives the corrected forms. This file is shipped inside the FMU, hence it imports nothing but
-the standard library and ``analytic.sliding``, which is shipped with it.
+`docs/closed_form.md` derives the corrected forms. This file is shipped inside the FMU, hence it imports nothing but
+the standard library and `analytic.sliding`, which is shipped with it.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ VARIANTS = ("stick_slip", "momentum_closed", "as_printed")
 PHASES = ("approach", "stick", "acceleration", "deceleration", "inertia", "rest")
 """Names of the phases of an impact.
 
-``approach``: the flow has not arrived. ``stick``: the force acts, the barrier does not move. ``acceleration`` and
-``deceleration``: the barrier slides while the force is above (below) the friction. ``inertia``: the force has ended,
-the barrier still slides. ``rest``: the force has ended, the barrier does not move.
+`approach`: the flow has not arrived. `stick`: the force acts, the barrier does not move. `acceleration` and
+`deceleration`: the barrier slides while the force is above (below) the friction. `inertia`: the force has ended,
+the barrier still slides. `rest`: the force has ended, the barrier does not move.
 """
 
 
@@ -63,29 +63,29 @@ class Phase:
 class Impact:
     """One impact: its inputs, checked, and its results.
 
-    Parameters
-    ----------
-    flow_mass: m1 [kg/m] > 0.
-    barrier_mass: m2 [kg/m] > 0; ``None`` or infinity for a fixed barrier.
-    flow_length: L_1,0 [m] > 0, length of the equivalent box.
-    flow_height: h [m] > 0, depth of the flow.
-    speed: v_1,0 [m/s] > 0, velocity of the flow on arrival.
-    barrier_initial_velocity: v_2,0 [m/s], 0 <= v_2,0 < v_1,0; 0 for a fixed barrier.
-    base_friction: tan(delta_b) [-] >= 0; required unless the barrier is fixed. On a slope more than its tangent.
-    geometry_change: lambda = s1max / L_1,0 [-], in (0, 1]. Give either this or ``s1max``.
-    s1max: largest geometry change length of the flow [m], in (0, L_1,0].
-    rise_ratio: tau = T1 / T2 [-], in (0, 1].
-    vertical_load_ratio: kappa [-] >= 0, vertical load of the flow on the barrier over its horizontal force. The paper
-        leaves it out (0); it adds kappa F tan(delta_b) to the friction while the force acts. kappa tan(delta_b) < 1.
-    variant: one of ``VARIANTS``.
-    arrival_time: time at which the front reaches the barrier [s] >= 0; all times below count from the same zero.
-    gravity: g [m/s^2] > 0.
-    slope: theta [degrees] in (-90, 90), by which the ground falls in the direction of the flow. It acts on the barrier;
-        the flow's own weight along the slope is not in the model.
+    Args:
+        flow_mass: m1 [kg/m] > 0.
+        barrier_mass: m2 [kg/m] > 0; `None` or infinity for a fixed barrier.
+        flow_length: L_1,0 [m] > 0, length of the equivalent box.
+        flow_height: h [m] > 0, depth of the flow.
+        speed: v_1,0 [m/s] > 0, velocity of the flow on arrival.
+        barrier_initial_velocity: v_2,0 [m/s], 0 <= v_2,0 < v_1,0; 0 for a fixed barrier.
+        base_friction: tan(delta_b) [-] >= 0; required unless the barrier is fixed. On a slope more than its tangent.
+        geometry_change: lambda = s1max / L_1,0 [-], in (0, 1]. Give either this or `s1max`.
+        s1max: largest geometry change length of the flow [m], in (0, L_1,0].
+        rise_ratio: tau = T1 / T2 [-], in (0, 1].
+        vertical_load_ratio: kappa [-] >= 0, vertical load of the flow on the barrier over its horizontal force. The
+            paper leaves it out (0); it adds kappa F tan(delta_b) to the friction while the force acts. kappa
+            tan(delta_b) < 1.
+        variant: one of `VARIANTS`.
+        arrival_time: time at which the front reaches the barrier [s] >= 0; all times below count from the same zero.
+        gravity: g [m/s^2] > 0.
+        slope: theta [degrees] in (-90, 90), by which the ground falls in the direction of the flow. It acts on the
+            barrier; the flow's own weight along the slope is not in the model.
 
-    Raises
-    ------
-    ValueError: an input is missing, not finite, or out of its range; the sentence names it, its value and the range.
+    Raises:
+        ValueError: an input is missing, not finite, or out of its range; the sentence names it, its value and the
+            range.
     """
 
     flow_mass: float
@@ -194,13 +194,13 @@ class Impact:
     def common_velocity(self) -> float:
         """Velocity [m/s] of flow and barrier together after an inelastic impact with this impulse, (v_1,0 - J / m1).
 
-        Equal to v_CM of Eq. (A17) except in the variant ``momentum_closed``.
+        Equal to v_CM of Eq. (A17) except in the variant `momentum_closed`.
         """
         return 0.0 if self.fixed else self.speed - self.impulse / self.flow_mass
 
     @property
     def barrier_velocity_max(self) -> float:
-        """Largest velocity of the barrier [m/s]; v_CM (1 - R / F_peak)^2 in ``stick_slip`` with v_2,0 = kappa = 0."""
+        """Largest velocity of the barrier [m/s]; v_CM (1 - R / F_peak)^2 in `stick_slip` with v_2,0 = kappa = 0."""
         # The velocity is extreme where F = R, and a phase begins there.
         return max(phase.barrier.velocity for phase in self.phases)
 
@@ -231,54 +231,54 @@ class Impact:
     # --- functions of time -----------------------------------------------------------------------------------------
 
     def phase(self, t: float) -> str:
-        """Name of the phase at the time ``t`` [s]; at the instant between two phases, the earlier one."""
+        """Name of the phase at the time `t` [s]; at the instant between two phases, the earlier one."""
         return self._phase(t - self.arrival_time).name
 
     def force(self, t: float) -> float:
-        """Horizontal impact force F [N/m] at the time ``t`` [s], Eqs. (6) and (A35)."""
+        """Horizontal impact force F [N/m] at the time `t` [s], Eqs. (6) and (A35)."""
         since = t - self.arrival_time
         phase = self._phase(since)
         return phase.force + (since - phase.start) * phase.force_rate
 
     def impulse_until(self, t: float) -> float:
-        """Integral of F from arrival to the time ``t`` [N s/m]."""
+        """Integral of F from arrival to the time `t` [N s/m]."""
         since = t - self.arrival_time
         phase = self._phase(since)
         u = since - phase.start
         return phase.impulse + u * (phase.force + u * phase.force_rate / 2)
 
     def flow_velocity(self, t: float) -> float:
-        """Velocity v1 [m/s] of the flow's centre of mass at the time ``t`` [s]."""
+        """Velocity v1 [m/s] of the flow's centre of mass at the time `t` [s]."""
         since = t - self.arrival_time
         return self._phase(since).flow.velocity_at(since)
 
     def flow_displacement(self, t: float) -> float:
-        """Travel [m] of the flow's centre of mass since arrival (negative before) at the time ``t`` [s]."""
+        """Travel [m] of the flow's centre of mass since arrival (negative before) at the time `t` [s]."""
         since = t - self.arrival_time
         return self._phase(since).flow.displacement_at(since)
 
     def flow_kinetic_energy(self, t: float) -> float:
-        """E_k1 = m1 v1^2 / 2 [J/m] at the time ``t`` [s], Eq. (11)."""
+        """E_k1 = m1 v1^2 / 2 [J/m] at the time `t` [s], Eq. (11)."""
         return self.flow_mass * self.flow_velocity(t) ** 2 / 2
 
     def barrier_velocity(self, t: float) -> float:
-        """Velocity v2 [m/s] of the barrier at the time ``t`` [s]."""
+        """Velocity v2 [m/s] of the barrier at the time `t` [s]."""
         since = t - self.arrival_time
         return self._phase(since).barrier.velocity_at(since)
 
     def barrier_displacement(self, t: float) -> float:
-        """Displacement of the barrier since arrival [m] at the time ``t`` [s]."""
+        """Displacement of the barrier since arrival [m] at the time `t` [s]."""
         since = t - self.arrival_time
         return self._phase(since).barrier.displacement_at(since)
 
     def barrier_kinetic_energy(self, t: float) -> float:
-        """E_k2 = m2 v2^2 / 2 [J/m] at the time ``t`` [s], Eq. (13); nil where the barrier is fixed."""
+        """E_k2 = m2 v2^2 / 2 [J/m] at the time `t` [s], Eq. (13); nil where the barrier is fixed."""
         return self._barrier_energy(self.barrier_velocity(t))
 
     def scaled_to_speed(self, speed: float) -> Impact:
         """The same flow at another speed, by the paper's rule (section 3.2): s1max grows and tau falls with the speed.
 
-        ``s1max`` is capped at the flow's length and the rise ratio at 1. ``speed`` [m/s] is the new v_1,0.
+        `s1max` is capped at the flow's length and the rise ratio at 1. `speed` [m/s] is the new v_1,0.
         """
         _require("speed", speed, 0, math.inf, open_low=True)
         ratio = speed / self.speed
@@ -289,7 +289,7 @@ class Impact:
     # --- construction ------------------------------------------------------------------------------------------------
 
     def _phase(self, since: float) -> Phase:
-        """Phase at the time ``since`` arrival [s]."""
+        """Phase at the time `since` arrival [s]."""
         # bisect_left: an instant between two phases belongs to the earlier, so T2 is the end of the impact stage.
         return self.phases[max(bisect_left(self._starts, since) - 1, 0)]
 
@@ -427,7 +427,7 @@ def _moves(motion: Motion) -> bool:
 def _require(
     name: str, value: float, low: float, high: float, *, open_low: bool = False, open_high: bool = False, why: str = ""
 ) -> None:
-    """Raise ValueError with one sentence unless ``value`` is a finite number in the range."""
+    """Raise ValueError with one sentence unless `value` is a finite number in the range."""
     inside = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if inside:
         inside = (value > low if open_low else value >= low) and (value < high if open_high else value <= high)

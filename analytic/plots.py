@@ -43,9 +43,8 @@ class PlotError(ValueError):
 def check_path(path: Path) -> None:
     """Refuse a picture file before anything is computed for it.
 
-    Raises
-    ------
-    PlotError: the format is unknown or the folder does not exist.
+    Raises:
+        PlotError: the format is unknown or the folder does not exist.
     """
     if path.suffix.lstrip(".").lower() not in FORMATS:
         raise PlotError(f"{path} has the suffix {path.suffix!r}, a picture is one of {', '.join(FORMATS)}.")
@@ -56,9 +55,8 @@ def check_path(path: Path) -> None:
 def save(figure: Figure, path: Path) -> None:
     """Write a picture, whole or not at all.
 
-    Raises
-    ------
-    PlotError: see ``check_path``, or the file cannot be written.
+    Raises:
+        PlotError: see `check_path`, or the file cannot be written.
     """
     check_path(path)
     FigureCanvasAgg(figure)
@@ -112,7 +110,7 @@ def _end(impact: Impact) -> float:
 def calibrations(records: Sequence[tuple[str, Mapping[str, Array], Sequence[Calibration]]]) -> Figure:
     """Recorded and closed-form force and kinetic energies, one row for each record (as Figs. 10 and 11).
 
-    ``records``: title, time series and the calibrations on it.
+    `records`: title, time series and the calibrations on it.
     """
     figure = Figure(figsize=(10, 2.6 * len(records) + 0.6), layout="constrained")
     rows = figure.subplots(len(records), 2, squeeze=False)
@@ -157,7 +155,7 @@ KEY_FIGURE_LABELS = {
 def comparison(title: str, figures: Mapping[str, Mapping[str, KeyFigures]], sliding: bool) -> Figure:
     """Bars of each quantity by record and source (as Fig. 13 for fixed barriers, Fig. 14 for sliding ones).
 
-    ``figures``: by record, then by source ("simulated", "closed form, ...").
+    `figures`: by record, then by source ("simulated", "closed form, ...").
     """
     names = [name for name in KEY_FIGURE_LABELS if sliding or not name.startswith("barrier")]
     figure = Figure(figsize=(10, 3.0 * -(-len(names) // 2) + 0.8), layout="constrained")

@@ -35,8 +35,8 @@ INPUTS = {
 
 @dataclass(frozen=True)
 class Distribution:
-    """An uncertain number: ``normal(mean, deviation)``, ``lognormal(mean, coefficient of variation)``,
-    ``uniform(low, high)`` or ``triangular(low, mode, high)``.
+    """An uncertain number: `normal(mean, deviation)`, `lognormal(mean, coefficient of variation)`,
+    `uniform(low, high)` or `triangular(low, mode, high)`.
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Distribution:
         return f"{self.kind}({', '.join(f'{value:g}' for value in self.parameters)})"
 
     def quantile(self, probability: Array, low: float = -math.inf, high: float = math.inf) -> Array:
-        """Values at the probabilities in (0, 1), of the distribution cut off at ``low`` and ``high``."""
+        """Values at the probabilities in (0, 1), of the distribution cut off at `low` and `high`."""
         start, end = (float(self._cumulative(bound)) for bound in (low, high))
         return self._inverse(start + (end - start) * probability)
 
@@ -100,11 +100,10 @@ _KINDS = {
 
 
 def parse(name: str, text: str) -> float | Distribution:
-    """A number, or a distribution written as ``kind(parameters)``; ``name`` is for the error.
+    """A number, or a distribution written as `kind(parameters)`; `name` is for the error.
 
-    Raises
-    ------
-    ValueError: one sentence that names the input, the text and what it may be.
+    Raises:
+        ValueError: one sentence that names the input, the text and what it may be.
     """
     forms = ", ".join(form for form, _ in _KINDS.values())
     try:
@@ -141,7 +140,7 @@ class Reliability:
     probability: float
     """Of a displacement beyond the limit."""
     interval: tuple[float, float]
-    """95 % confidence interval of ``probability`` (Wilson's)."""
+    """95 % confidence interval of `probability` (Wilson's)."""
     mean: float
     """Mean displacement [m]."""
     quantiles: Mapping[float, float]
@@ -176,16 +175,14 @@ def reliability(
 ) -> Reliability:
     """Sample the closed form.
 
-    Parameters
-    ----------
-    inputs: a number or a distribution for each of ``INPUTS``; they are independent of each other.
-    limit: on the final displacement [m] >= 0.
-    samples: number of samples for the probability, at least 1000.
-    seed: of the random numbers; the same seed gives the same result.
+    Args:
+        inputs: a number or a distribution for each of `INPUTS`; they are independent of each other.
+        limit: on the final displacement [m] >= 0.
+        samples: number of samples for the probability, at least 1000.
+        seed: of the random numbers; the same seed gives the same result.
 
-    Raises
-    ------
-    ValueError: an input is unknown, missing or out of its range, or nothing is uncertain.
+    Raises:
+        ValueError: an input is unknown, missing or out of its range, or nothing is uncertain.
     """
     fixed, uncertain = _sorted(inputs)
     uniform = _uniform(limit, samples, len(uncertain), seed)
@@ -219,13 +216,12 @@ def lightest_mass(
     gravity: float = STANDARD_GRAVITY,
     slope: float = 0.0,
 ) -> float:
-    """Least barrier mass [kg/m] that slides beyond ``limit`` [m] with at most the given probability.
+    """Least barrier mass [kg/m] that slides beyond `limit` [m] with at most the given probability.
 
-    The same samples serve every trial mass. ``inputs``: as in ``reliability``; a ``barrier_mass`` there is not used.
+    The same samples serve every trial mass. `inputs`: as in `reliability`; a `barrier_mass` there is not used.
 
-    Raises
-    ------
-    ValueError: as ``reliability``; the probability is not in (0, 1); or no mass is enough.
+    Raises:
+        ValueError: as `reliability`; the probability is not in (0, 1); or no mass is enough.
     """
     if not 0 < probability < 1:
         raise ValueError(f"probability is {probability:g}, it must be a number in (0, 1).")
@@ -256,7 +252,7 @@ def _uniform(limit: float, samples: int, count: int, seed: int) -> Array:
 
 
 def _values(fixed: Mapping[str, Any], uncertain: Mapping[str, Distribution], points: Array) -> dict[str, Any]:
-    """Inputs of ``outcomes`` at points of the unit cube."""
+    """Inputs of `outcomes` at points of the unit cube."""
     values = dict(fixed)
     for column, (name, distribution) in enumerate(uncertain.items()):
         values[name] = distribution.quantile(points[:, column], *INPUTS[name])

@@ -1,6 +1,6 @@
 """What the closed form needs to know of a flow and a barrier, as numbers or taken from a scenario of the simulator.
 
-The scenario's schema is loaded where a scenario is read, so that ``predict`` starts at once where numbers are given.
+The scenario's schema is loaded where a scenario is read, so that `predict` starts at once where numbers are given.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class SceneError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A flow and a barrier, SI units per metre of width. ``None``: not known, or not there."""
+    """A flow and a barrier, SI units per metre of width. `None`: not known, or not there."""
 
     flow_mass: float
     """m1 [kg/m]."""
@@ -39,7 +39,7 @@ class Scene:
     speed: float
     """v_1,0 [m/s]."""
     barrier_mass: float | None = None
-    """m2 [kg/m]; ``None`` for a fixed barrier."""
+    """m2 [kg/m]; `None` for a fixed barrier."""
     base_friction: float | None = None
     """tan(delta_b) [-] of a barrier that may slide."""
     gravity: float = STANDARD_GRAVITY
@@ -127,7 +127,7 @@ class Scene:
         return PAPER_GEOMETRY_CHANGE["fixed" if self.fixed else "sliding"]
 
     def impact(self, **model: Any) -> Impact:
-        """The impact, with what is given in ``model``: geometry change, rise ratio, variant, ... (see ``Impact``)."""
+        """The impact, with what is given in `model`: geometry change, rise ratio, variant, ... (see `Impact`)."""
         if "geometry_change" not in model and "s1max" not in model:
             model["geometry_change"] = self.paper_geometry_change
         scene = {
@@ -146,10 +146,9 @@ class Scene:
 def read_scene(path: str | Path) -> Scene:
     """Read a scenario file of the simulator, or the scenario of a run folder.
 
-    Raises
-    ------
-    ScenarioError: the file cannot be read, or is no scenario; as the simulator says it.
-    SceneError: the closed form has no answer to the scenario.
+    Raises:
+        ScenarioError: the file cannot be read, or is no scenario; as the simulator says it.
+        SceneError: the closed form has no answer to the scenario.
     """
     from warp_mpm.scenario import Scenario
 
@@ -160,11 +159,10 @@ def read_scene(path: str | Path) -> Scene:
 
 
 def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
-    """The numbers of a scenario; ``name`` is for messages.
+    """The numbers of a scenario; `name` is for messages.
 
-    Raises
-    ------
-    SceneError: it has no barrier, one that follows a given velocity, or a flow that does not move towards it.
+    Raises:
+        SceneError: it has no barrier, one that follows a given velocity, or a flow that does not move towards it.
     """
     from warp_mpm.slips import slips
 

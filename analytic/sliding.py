@@ -1,7 +1,7 @@
 """Exact motion of a body on a frictional base while the forces on it are linear in time; standard library only.
 
 The one integrator of stick and slip in Python: the closed form is built from it, and it is shipped inside the FMU.
-``fmu/c/barrier_sliding.c`` has the same in C, in the same order of operations.
+`fmu/c/barrier_sliding.c` has the same in C, in the same order of operations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Motion of a body from ``start`` on, a cubic in time: displacement, velocity, acceleration, jerk at the start."""
+    """Motion of a body from `start` on, a cubic in time: displacement, velocity, acceleration, jerk at the start."""
 
     start: float
     displacement: float
@@ -22,17 +22,17 @@ class Motion:
     jerk: float = 0.0
 
     def displacement_at(self, t: float) -> float:
-        """Displacement [m] at the time ``t`` [s]."""
+        """Displacement [m] at the time `t` [s]."""
         u = t - self.start
         return self.displacement + u * (self.velocity + u * (self.acceleration / 2 + u * self.jerk / 6))
 
     def velocity_at(self, t: float) -> float:
-        """Velocity [m/s] at the time ``t`` [s]."""
+        """Velocity [m/s] at the time `t` [s]."""
         u = t - self.start
         return self.velocity + u * (self.acceleration + u * self.jerk / 2)
 
     def shifted(self, t: float) -> Motion:
-        """The same motion, described from the time ``t`` on."""
+        """The same motion, described from the time `t` on."""
         acceleration = self.acceleration + (t - self.start) * self.jerk
         return Motion(t, self.displacement_at(t), self.velocity_at(t), acceleration, self.jerk)
 
@@ -52,19 +52,17 @@ def coulomb_motion(
     The body holds still while the force stays within the friction, slips when it exceeds it, and stops when its
     velocity is spent, be it to hold still or to go back.
 
-    Parameters
-    ----------
-    before: motion of the body up to ``start``.
-    start, end: times [s].
-    force, force_rate: force along the base at ``start`` [N/m], of either sign, and its rate [N/(m s)].
-    friction, friction_rate: largest force that the base resists at ``start`` [N/m] >= 0, and its rate [N/(m s)]; the
-        friction may be infinite.
-    mass: [kg/m], may be infinite.
+    Args:
+        before: motion of the body up to `start`.
+        start, end: times [s].
+        force, force_rate: force along the base at `start` [N/m], of either sign, and its rate [N/(m s)].
+        friction, friction_rate: largest force that the base resists at `start` [N/m] >= 0, and its rate [N/(m s)];
+            the friction may be infinite.
+        mass: [kg/m], may be infinite.
 
-    Yields
-    ------
-    The pieces of the motion in order of time, each of which lasts until the next begins; none where ``end`` is not
-    after ``start``.
+    Yields:
+        The pieces of the motion in order of time, each of which lasts until the next begins; none where `end` is not
+        after `start`.
     """
     t, displacement, velocity = start, before.displacement_at(start), before.velocity_at(start)
     while t < end:
@@ -103,7 +101,7 @@ def slide(
     friction_rate: float,
     mass: float,
 ) -> tuple[float, float]:
-    """Displacement [m] and velocity [m/s] at the end of ``coulomb_motion`` over a ``duration`` [s]."""
+    """Displacement [m] and velocity [m/s] at the end of `coulomb_motion` over a `duration` [s]."""
     before = Motion(0.0, displacement, velocity)
     pieces = coulomb_motion(before, 0.0, duration, force, force_rate, friction, friction_rate, mass)
     last = [before, *pieces][-1]

@@ -47,17 +47,15 @@ GRAVITY = 9.81
 
 
 def plan(template: Mapping[str, Any], count: int, seed: int = 1) -> dict[str, dict[str, Any]]:
-    """Scenario files of a sweep by name, spread evenly over ``RANGES`` by a scrambled Sobol' sequence.
+    """Scenario files of a sweep by name, spread evenly over `RANGES` by a scrambled Sobol' sequence.
 
-    Parameters
-    ----------
-    template: content of a two-phase scenario with a trapezoid; the material beside the porosity is taken from it.
-    count: number of scenes > 0.
-    seed: of the sequence.
+    Args:
+        template: content of a two-phase scenario with a trapezoid; the material beside the porosity is taken from it.
+        count: number of scenes > 0.
+        seed: of the sequence.
 
-    Raises
-    ------
-    ValueError: the count is not positive.
+    Raises:
+        ValueError: the count is not positive.
     """
     if count < 1:
         raise ValueError(f"count is {count}, it must be at least 1.")
@@ -140,10 +138,10 @@ class Run:
     face_angle: float
     barrier_height: float
     barrier_mass: float
-    """``nan`` where the barrier is fixed, likewise in the columns below that it has no value for."""
+    """`nan` where the barrier is fixed, likewise in the columns below that it has no value for."""
     base_friction: float
     peak_force: float
-    """Of the filtered force, see ``analytic.calibration``."""
+    """Of the filtered force, see `analytic.calibration`."""
     rise_time: float
     duration: float
     impulse: float
@@ -173,10 +171,9 @@ class Run:
 def collect(folder: Path) -> Run:
     """The row of a run folder.
 
-    Raises
-    ------
-    SceneError, TimeSeriesError, CalibrationError: the folder holds no usable record of an impact, or one that ends
-    before the impact does, or of an impact on a slope, for which the table has no column.
+    Raises:
+        SceneError, TimeSeriesError, CalibrationError: the folder holds no usable record of an impact, or one that ends
+        before the impact does, or of an impact on a slope, for which the table has no column.
     """
     scene, series = read_scene(folder), read_time_series(folder)
     if scene.slope != 0:
@@ -215,7 +212,7 @@ def collect(folder: Path) -> Run:
 
 
 def write_table(runs: Iterable[Run], path: Path, remark: str = "") -> None:
-    """Write the table; ``remark`` becomes a comment in its first line."""
+    """Write the table; `remark` becomes a comment in its first line."""
     with path.open("w", encoding="utf-8", newline="") as file:
         if remark:
             file.write(f"# {remark}\n")
@@ -226,11 +223,10 @@ def write_table(runs: Iterable[Run], path: Path, remark: str = "") -> None:
 
 
 def read_table(path: Path) -> list[Run]:
-    """Read a table that ``write_table`` has written.
+    """Read a table that `write_table` has written.
 
-    Raises
-    ------
-    ValueError: the file cannot be read, or is no such table; one sentence.
+    Raises:
+        ValueError: the file cannot be read, or is no such table; one sentence.
     """
     try:
         lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]

@@ -1,4 +1,4 @@
-"""Fitting the constants of the variant ``calibrated`` to the table of a sweep, and how well they predict.
+"""Fitting the constants of the variant `calibrated` to the table of a sweep, and how well they predict.
 
 Every error is of a scene that the constants were not fitted to: five-fold cross-validation.
 """
@@ -50,7 +50,7 @@ class Score:
     displacement_median: float
     """Median of |closed - simulated| [m]."""
     displacement_bias: float
-    """Median of closed / simulated, both raised by ``SMALL_DISPLACEMENT`` depths [-]."""
+    """Median of closed / simulated, both raised by `SMALL_DISPLACEMENT` depths [-]."""
     displacement_factor: float
     """exp of the root mean square of ln(closed / simulated), both raised likewise [-]."""
     within_two: float
@@ -61,12 +61,12 @@ Rule = Callable[[Scene], Coefficients]
 
 
 def paper_rule(scene: Scene) -> Coefficients:
-    """The paper's two constants in the variant ``stick_slip``."""
+    """The paper's two constants in the variant `stick_slip`."""
     return Coefficients(geometry_change=scene.paper_geometry_change)
 
 
 def score(runs: Sequence[Run], predicted: Sequence[Coefficients]) -> Score:
-    """How well the closed form with the numbers ``predicted`` for each run meets the runs."""
+    """How well the closed form with the numbers `predicted` for each run meets the runs."""
     impacts = [run.scene.impact(**numbers.model) for run, numbers in zip(runs, predicted, strict=True)]
     force = np.array([i.peak_force / run.peak_force for i, run in zip(impacts, runs, strict=True)])
     rise = np.array([i.peak_time / run.rise_time for i, run in zip(impacts, runs, strict=True)])
@@ -93,7 +93,7 @@ def fit(runs: Sequence[Run]) -> Constants:
     """The constants of peak force and rise time that meet the runs best, all of them fixed or all of them sliding.
 
     T1 by linear least squares on its logarithm, F_peak by least squares on its logarithm, in which residuals beyond
-    ``ROBUST_SCALE`` count less (soft L1): a few flows pile up behind a high barrier and push hardest long after the
+    `ROBUST_SCALE` count less (soft L1): a few flows pile up behind a high barrier and push hardest long after the
     jet, and one formula cannot have both. The displacement takes no part: it is predicted.
     """
     fixed = runs[0].fixed

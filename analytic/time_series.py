@@ -1,4 +1,4 @@
-"""Time series of an impact from a run folder's ``timeseries.csv`` or any CSV file whose header names units."""
+"""Time series of an impact from a run folder's `timeseries.csv` or any CSV file whose header names units."""
 
 from __future__ import annotations
 
@@ -33,19 +33,17 @@ class TimeSeriesError(ValueError):
 
 
 def read_time_series(path: str | Path) -> Series:
-    """Read the columns of ``UNITS`` that the file has; a folder stands for its ``timeseries.csv``.
+    """Read the columns of `UNITS` that the file has; a folder stands for its `timeseries.csv`.
 
-    The header reads ``time [s],impact_force_x [N/m],...``; time increases, and a force is the mean over the interval
+    The header reads `time [s],impact_force_x [N/m],...`; time increases, and a force is the mean over the interval
     that ends at its time. Other columns are ignored, and so is a last line without an end, which a run that is still
     going leaves behind.
 
-    Returns
-    -------
-    Arrays [samples] in SI units by column name; ``time`` and ``impact_force_x`` are there.
+    Returns:
+        Arrays [samples] in SI units by column name; `time` and `impact_force_x` are there.
 
-    Raises
-    ------
-    TimeSeriesError: the file is missing, or a column, unit or number is wrong.
+    Raises:
+        TimeSeriesError: the file is missing, or a column, unit or number is wrong.
     """
     path = Path(path)
     if path.is_dir():

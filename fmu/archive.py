@@ -91,8 +91,8 @@ class BuildError(Exception):
 
 @dataclass(frozen=True)
 class PythonUnit:
-    """A unit that pythonfmu packs: its module in ``fmu/units``, its slave class, and other modules that it needs, of
-    that folder, of ``analytic`` and of ``warp_mpm/quantities``."""
+    """A unit that pythonfmu packs: its module in `fmu/units`, its slave class, and other modules that it needs, of
+    that folder, of `analytic` and of `warp_mpm/quantities`."""
 
     name: str
     module: str
@@ -131,22 +131,20 @@ def build_python_unit(
     simulated: Mapping[str, bytes] | None = None,
     recorded: bool = True,
 ) -> Path:
-    """Build ``folder/<name>.fmu``.
+    """Build `folder/<name>.fmu`.
 
-    Parameters
-    ----------
-    unit: which one.
-    folder: created if missing; an archive of the same name in it is replaced.
-    version: instead of the project's version.
-    scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
-    simulated: reference results of ``DebrisFlow``, from ``simulated_reference``; those of the other units are always
-        there.
-    recorded: whether ``DebrisFlow`` remembers this Python as the one that has the simulator; without, it is the same
-        file wherever it is built.
+    Args:
+        unit: which one.
+        folder: created if missing; an archive of the same name in it is replaced.
+        version: instead of the project's version.
+        scenario: the scenario file inside `DebrisFlow`, Set IIb if None.
+        simulated: reference results of `DebrisFlow`, from `simulated_reference`; those of the other units are
+            always there.
+        recorded: whether `DebrisFlow` remembers this Python as the one that has the simulator; without, it is the
+            same file wherever it is built.
 
-    Raises
-    ------
-    BuildError: pythonfmu refused; nothing is left in ``folder``.
+    Raises:
+        BuildError: pythonfmu refused; nothing is left in `folder`.
     """
     version = version or project_version()
     sources = _shipped_sources(unit)
@@ -213,11 +211,10 @@ def _run_pythonfmu(stage: Path, script: str, package: str) -> None:
 
 
 def scenario_for(chosen: Path | None) -> Path:
-    """The scenario file inside ``DebrisFlow``.
+    """The scenario file inside `DebrisFlow`.
 
-    Raises
-    ------
-    BuildError: it is not there.
+    Raises:
+        BuildError: it is not there.
     """
     scenario = chosen or DEFAULT_SCENARIO
     if not scenario.is_file():
@@ -246,11 +243,10 @@ def _whole(scenario: Path) -> bytes:
 
 
 def simulated_reference(scenario: Path | None) -> dict[str, bytes]:
-    """Run the simulator for the reference results of ``DebrisFlow`` with a scenario, Set IIb if None.
+    """Run the simulator for the reference results of `DebrisFlow` with a scenario, Set IIb if None.
 
-    Raises
-    ------
-    BuildError: the scenario is not there, or does not run.
+    Raises:
+        BuildError: the scenario is not there, or does not run.
     """
     with tempfile.TemporaryDirectory(prefix="fmu_build_") as temporary:
         for name, data in _simulator_resources(scenario_for(scenario)).items():

@@ -1,7 +1,7 @@
 """Builds the units in plain C, for hosts that have no Python: one model each, in two versions of the standard.
 
 The table of variables is written out as a C header, so a unit in C has the interface of the one in Python. The PyPI
-package ``ziglang`` brings a compiler that builds for every platform from any one; without it the machine's own C
+package `ziglang` brings a compiler that builds for every platform from any one; without it the machine's own C
 compiler builds for the machine alone.
 """
 
@@ -41,9 +41,9 @@ class CUnit:
     base: str
     """Name of the Python unit."""
     module: str
-    """Of the table in ``fmu/units``, and of the model in ``fmu/c``."""
+    """Of the table in `fmu/units`, and of the model in `fmu/c`."""
     fmi: str
-    """``2.0`` or ``3.0``."""
+    """`2.0` or `3.0`."""
     derivatives: int = 0
     """Highest order of the derivatives of outputs that the model gives."""
     own_sources: tuple[str, ...] = ()
@@ -125,21 +125,19 @@ def build_c_unit(
     simulated: Mapping[str, bytes] | None = None,
     recorded: bool = True,
 ) -> Path:
-    """Build ``folder/<name>.fmu``, its sources included.
+    """Build `folder/<name>.fmu`, its sources included.
 
-    Parameters
-    ----------
-    unit: which one.
-    folder: created if missing; an archive of the same name in it is replaced.
-    platforms: names out of ``PLATFORMS``; None builds all where ``ziglang`` is installed, else this machine's.
-    version: instead of the project's version.
-    scenario: the scenario file inside ``DebrisFlow``, Set IIb if None.
-    simulated: reference results of ``DebrisFlow``, from ``archive.simulated_reference``.
-    recorded: whether ``DebrisFlow`` remembers this Python as the one that has the simulator.
+    Args:
+        unit: which one.
+        folder: created if missing; an archive of the same name in it is replaced.
+        platforms: names out of `PLATFORMS`; None builds all where `ziglang` is installed, else this machine's.
+        version: instead of the project's version.
+        scenario: the scenario file inside `DebrisFlow`, Set IIb if None.
+        simulated: reference results of `DebrisFlow`, from `archive.simulated_reference`.
+        recorded: whether `DebrisFlow` remembers this Python as the one that has the simulator.
 
-    Raises
-    ------
-    BuildError: there is no compiler for a platform, or it failed; nothing is left in ``folder``.
+    Raises:
+        BuildError: there is no compiler for a platform, or it failed; nothing is left in `folder`.
     """
     version = version or project_version()
     chosen = check_platforms(unit, platforms if platforms is not None else default_platforms())
@@ -192,9 +190,8 @@ def default_platforms() -> tuple[str, ...]:
 def check_platforms(unit: CUnit, platforms: tuple[str, ...]) -> tuple[str, ...]:
     """Those of the platforms for which a unit is built.
 
-    Raises
-    ------
-    BuildError: there is none, or one of them is unknown.
+    Raises:
+        BuildError: there is none, or one of them is unknown.
     """
     unknown = [name for name in platforms if name not in PLATFORMS]
     if unknown:
@@ -216,12 +213,12 @@ def offered(unit: CUnit, platform: str) -> bool:
 
 
 def has_cross_compiler() -> bool:
-    """Whether the package ``ziglang`` is installed."""
+    """Whether the package `ziglang` is installed."""
     return importlib.util.find_spec("ziglang") is not None
 
 
 def needs_cross_compiler(what: str) -> str:
-    """The sentence for what cannot be built without ``ziglang``."""
+    """The sentence for what cannot be built without `ziglang`."""
     return missing(what, "the package ziglang", "fmu")
 
 
@@ -299,7 +296,7 @@ def table_header(unit: CUnit, identity: str) -> str:
 
 
 def universal_binary(slices: list[bytes]) -> bytes:
-    """Join Mach-O binaries of several processors into one file, as Apple's ``lipo`` does."""
+    """Join Mach-O binaries of several processors into one file, as Apple's `lipo` does."""
     alignment = 14  # 2**14 bytes, the page of Apple's own processors
     header, bodies, offset = struct.pack(">II", 0xCAFEBABE, len(slices)), [], 1 << alignment
     for data in slices:

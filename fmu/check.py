@@ -35,9 +35,8 @@ class Result:
 def check_archive(path: Path) -> list[Result]:
     """Run all checks on an archive; none of them stops the next.
 
-    Raises
-    ------
-    CheckError: the file is no archive that could be checked.
+    Raises:
+        CheckError: the file is no archive that could be checked.
     """
     if not zipfile.is_zipfile(path):
         raise CheckError(f"{path} is no FMU archive.")

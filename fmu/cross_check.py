@@ -2,18 +2,18 @@
 
 Five ways of giving the unit its force are compared with the simulation:
 
-``paper``
+`paper`
     lambda as the paper prints it for fixed and sliding barriers; tau, which the paper does not print, as assumed in
-    ``analytic.scene``.
-``variant calibrated``
-    lambda, tau and the vertical load ratio of the scene, from the fit to a sweep of simulations (``analytic.fitted``);
+    `analytic.scene`.
+`variant calibrated`
+    lambda, tau and the vertical load ratio of the scene, from the fit to a sweep of simulations (`analytic.fitted`);
     it knows nothing of the simulation that it is compared with. Left out where the fit has no answer.
-``calibrated``
+`calibrated`
     s1max and tau from the simulated force, by the paper's rule: its peak and the time of its peak.
-``with vertical load``
+`with vertical load`
     As calibrated, and the base friction raised by the flow's weight on the barrier: kappa is the ratio of the simulated
     vertical to the horizontal impulse. The paper's model leaves it out.
-``simulated force``
+`simulated force`
     The simulated force and vertical load as inputs of the unit. What is left is the barrier's own motion, so this tells
     a fault in the unit from a limit of the closed form.
 """
@@ -77,7 +77,7 @@ class Comparison:
     figures: dict[str, float]
     """Key figures of the unit, SI."""
     errors: dict[str, float | None]
-    """Their relative differences from the simulation; None where its figure is nil or in ``CrossCheck.at_least``."""
+    """Their relative differences from the simulation; None where its figure is nil or in `CrossCheck.at_least`."""
     root_mean_squares: dict[str, float | None]
     """Of the differences of the curves, over the largest simulated value; None for a curve that is nil."""
 
@@ -117,17 +117,15 @@ def cross_check(
 ) -> CrossCheck:
     """Simulate a scenario, calibrate the closed form on it, and run the unit through fmpy in its five ways.
 
-    Parameters
-    ----------
-    scenario: with a fixed or a sliding barrier.
-    unit: archive of ``BarrierSliding``, or of its C twin.
-    device: of the simulation.
-    on_progress: called with the simulated time [s] now and then.
+    Args:
+        scenario: with a fixed or a sliding barrier.
+        unit: archive of `BarrierSliding`, or of its C twin.
+        device: of the simulation.
+        on_progress: called with the simulated time [s] now and then.
 
-    Raises
-    ------
-    SceneError: the closed form has no answer to the scenario.
-    CalibrationError: the flow does not hit the barrier within the run.
+    Raises:
+        SceneError: the closed form has no answer to the scenario.
+        CalibrationError: the flow does not hit the barrier within the run.
     """
     scene = scene_of(scenario, scenario.title)
     scene.impact()  # what the closed form has no answer to is refused before it is simulated
@@ -225,8 +223,8 @@ def run_unit(unit: Path, parameters: dict[str, Any], simulated: Trajectory) -> T
 def key_figures(trajectory: Trajectory, *, filtered: bool = True) -> dict[str, float]:
     """Key figures of a trajectory, SI.
 
-    ``filtered`` is for forces of the simulation: their peak is that of the moving mean over 50 ms. The impulse is that
-    from arrival to the end of the impact, as ``analytic.calibration.measure`` tells them.
+    `filtered` is for forces of the simulation: their peak is that of the moving mean over 50 ms. The impulse is that
+    from arrival to the end of the impact, as `analytic.calibration.measure` tells them.
     """
     measured = measure(trajectory.time, trajectory.force)
     force = moving_mean(trajectory.time, trajectory.force, measured.filter_window) if filtered else trajectory.force

@@ -50,7 +50,7 @@ _PLUGS: dict[str, dict[str, tuple[str, dict[str, str]]]] = {
 def model_description(
     interface: Interface, *, version: str, token: str, tool: str, needs_execution_tool: bool
 ) -> Element:
-    """The root element of ``modelDescription.xml``; arguments as for FMI 2.0, ``token`` is what the GUID was."""
+    """The root element of `modelDescription.xml`; arguments as for FMI 2.0, `token` is what the GUID was."""
     root = Element(
         "fmiModelDescription",
         {
@@ -119,7 +119,7 @@ def model_description(
 
 
 def build_description(name: str, source: str) -> Element:
-    """The root element of ``sources/buildDescription.xml``: one file to compile."""
+    """The root element of `sources/buildDescription.xml`: one file to compile."""
     root = Element("fmiBuildDescription", {"fmiVersion": VERSION})
     configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": name, "description": "Any C99 compiler"})
     sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
@@ -128,7 +128,7 @@ def build_description(name: str, source: str) -> Element:
 
 
 def terminals(base: str) -> Element:
-    """The root element of ``terminalsAndIcons/terminalsAndIcons.xml`` of a unit."""
+    """The root element of `terminalsAndIcons/terminalsAndIcons.xml` of a unit."""
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": VERSION})
     picture = SubElement(root, "GraphicalRepresentation")
     corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}

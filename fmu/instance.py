@@ -72,7 +72,7 @@ class Unit:
         return list(self.fmu.getFloat64(references) if self.fmi3 else self.fmu.getReal(references))
 
     def save(self) -> Any:
-        """The unit's state, for ``restore``."""
+        """The unit's state, for `restore`."""
         return self.fmu.getFMUState() if self.fmi3 else self.fmu.getFMUstate()
 
     def restore(self, state: Any, time: float) -> None:

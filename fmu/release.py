@@ -14,7 +14,7 @@ from fmu import archive, c_unit
 from fmu.system import write_system
 
 MANIFEST = "SHA256SUMS"
-"""In the form that ``sha256sum --check`` takes."""
+"""In the form that `sha256sum --check` takes."""
 
 SYSTEM = "SlidingBarrierWithAnchor.ssp"
 
@@ -28,16 +28,14 @@ def build_release(
 ) -> Path:
     """Build everything into a folder, and the manifest last.
 
-    Parameters
-    ----------
-    folder: created if missing; files of the same names in it are replaced.
-    platforms: of the units in C, as ``build_c_unit`` takes them.
-    with_simulated: whether the simulator runs for the reference results of its own units.
-    tell: called with each file when it is there.
+    Args:
+        folder: created if missing; files of the same names in it are replaced.
+        platforms: of the units in C, as `build_c_unit` takes them.
+        with_simulated: whether the simulator runs for the reference results of its own units.
+        tell: called with each file when it is there.
 
-    Raises
-    ------
-    BuildError: something cannot be built; what was built before is left, without a manifest.
+    Raises:
+        BuildError: something cannot be built; what was built before is left, without a manifest.
     """
     (folder / MANIFEST).unlink(missing_ok=True)
     simulated = archive.simulated_reference(None) if with_simulated else None

@@ -1,11 +1,11 @@
 """Start values of the closed-form unit for a scenario of the simulator, without a simulation.
 
-``paper``
+`paper`
     The paper's lambda, 0.72 for a fixed and 0.41 for a sliding barrier; tau, which it does not print, as assumed in
-    ``analytic.scene``; the variant ``stick_slip``.
-``calibrated``
-    lambda, tau and the vertical load ratio of the scene from the fit to simulations in ``analytic.fitted``; the variant
-    ``momentum_closed``, for which they were fitted.
+    `analytic.scene`; the variant `stick_slip`.
+`calibrated`
+    lambda, tau and the vertical load ratio of the scene from the fit to simulations in `analytic.fitted`; the variant
+    `momentum_closed`, for which they were fitted.
 """
 
 from __future__ import annotations
@@ -40,9 +40,8 @@ def scene_parameters(scene: Scene) -> dict[str, Any]:
 def force_parameters(scene: Scene, way: str) -> dict[str, Any]:
     """The unit's parameters that rule the force, and the variant of the model.
 
-    Raises
-    ------
-    ValueError: the fit needs to know the face's angle, and does not.
+    Raises:
+        ValueError: the fit needs to know the face's angle, and does not.
     """
     if way == PAPER:
         return {"geometry_change": scene.paper_geometry_change, "rise_ratio": ASSUMED_RISE_RATIO}

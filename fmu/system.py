@@ -50,7 +50,7 @@ Values = Mapping[str, Mapping[str, float]]
 
 
 def scenario_in(archive: Path) -> Scenario:
-    """The scenario inside an archive of ``DebrisFlow``."""
+    """The scenario inside an archive of `DebrisFlow`."""
     from warp_mpm import Scenario
 
     with zipfile.ZipFile(archive) as file:
@@ -60,9 +60,8 @@ def scenario_in(archive: Path) -> Scenario:
 def barrier_parameters(scenario: Scenario, barrier_mass: float | None = None) -> dict[str, float]:
     """What BarrierSliding must be given to be the scenario's barrier, or one of another mass [kg/m].
 
-    Raises
-    ------
-    ValueError: the scenario's barrier is none that BarrierSliding could be.
+    Raises:
+        ValueError: the scenario's barrier is none that BarrierSliding could be.
     """
     motion = scenario.barrier.motion if scenario.barrier is not None else None
     if scenario.barrier is None or motion is None or motion.kind != "sliding":
@@ -81,7 +80,7 @@ def barrier_parameters(scenario: Scenario, barrier_mass: float | None = None) ->
 
 
 def parameter_values(scenario: Scenario, spacing: float | None = None) -> Values:
-    """Parameters of the components by name, for a scenario; ``spacing`` [m] replaces the scenario's."""
+    """Parameters of the components by name, for a scenario; `spacing` [m] replaces the scenario's."""
     return {
         "flow": {"barrier_motion": 2, "spacing": spacing or 0.0},
         "barrier": {"impact_force_source": 2, **barrier_parameters(scenario)},
@@ -90,16 +89,14 @@ def parameter_values(scenario: Scenario, spacing: float | None = None) -> Values
 
 
 def write_system(archives: Path, path: Path, *, spacing: float | None = None) -> Path:
-    """Pack structure, parameters and units into ``path``; the same units give the same bytes.
+    """Pack structure, parameters and units into `path`; the same units give the same bytes.
 
-    Parameters
-    ----------
-    archives: folder with the units in C.
-    spacing: of the simulator's grid [m], instead of the scenario's.
+    Args:
+        archives: folder with the units in C.
+        spacing: of the simulator's grid [m], instead of the scenario's.
 
-    Raises
-    ------
-    ValueError: the scenario's barrier is none that BarrierSliding could be.
+    Raises:
+        ValueError: the scenario's barrier is none that BarrierSliding could be.
     """
     scenario = scenario_in(archives / f"{COMPONENTS['flow'][0]}.fmu")
     values = parameter_values(scenario, spacing)
@@ -125,7 +122,7 @@ def parameters_in(path: Path) -> dict[str, tuple[str, str]]:
 
 
 def structure(end_time: float) -> Element:
-    """The root element of ``SystemStructure.ssd``."""
+    """The root element of `SystemStructure.ssd`."""
     root = _element("ssd", "SystemStructureDescription", {"version": "1.0", "name": "SlidingBarrierWithAnchor"})
     about = {"name": "system", "description": "A debris flow pushes a barrier that an anchor holds back"}
     system = _child(root, "ssd", "System", about)

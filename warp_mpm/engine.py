@@ -30,6 +30,13 @@ ALLOWED_FAILURES = 5
 """How many of Dask's workers may die under a task before it counts as failed: one that kills them must not go on."""
 
 
+def cores() -> int:
+    """Cores that this process may use: of a batch job or a container its share, not the whole machine."""
+    if hasattr(os, "sched_getaffinity"):  # Linux
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class Task:
     """A call of a function of a module, with arguments that can be sent to another process."""

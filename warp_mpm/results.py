@@ -49,23 +49,17 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("time_step_min", "time_step_max"), (int, float, NoneType)),
     **dict.fromkeys(("material_points", "steps", "points_left", "points_pushed_out", "voids_closed"), (int,)),
     **dict.fromkeys(("gaps_bounded", "barrier_iterations", "barrier_unconverged"), (int,)),
-    **dict.fromkeys((f"steps_limited_by_{limit}" for limit in ("wave", "drag", "output")), (int,)),
+    **dict.fromkeys((f"steps_limited_by_{limit}" for limit in ("wave", "drag", "law", "output")), (int,)),
 }
 """What the entries of a run's record are, as far as anyone reads them."""
 
 _NUMBER = (int, float, NoneType)
 
 SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
-    **dict.fromkeys(FIGURES, _NUMBER),
-    **dict.fromkeys(("peak_force_filtered_time", "barrier_velocity_max_time"), _NUMBER),
-    **dict.fromkeys(("pore_pressure_max_time", "pore_pressure_max_anywhere_time"), _NUMBER),
-    **dict.fromkeys(("pressure_patch_max_time", "pore_pressure_patch_max_time"), _NUMBER),
-    **dict.fromkeys(("toe_moment_filtered_time", "heel_moment_filtered_time", "run_up_max_time"), _NUMBER),
-    **dict.fromkeys(("end_time", "material_points", "steps", "time_step_min", "time_step_max"), _NUMBER),
-    **dict.fromkeys(("initial_volume", "left_volume"), _NUMBER),
+    **{name: _NUMBER for name, figure in FIGURES.items() if figure.number},
     **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
-    **dict.fromkeys(("definitions", "mechanism_measures", "verdict"), (dict, NoneType)),
+    **dict.fromkeys(("definitions", "mechanism_measures", "not_recorded", "verdict"), (dict, NoneType)),
     "notes": (list,),
     "barriers": (list, NoneType),
 }

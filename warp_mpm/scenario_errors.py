@@ -110,7 +110,7 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
         close = [] if name in _all_names(model) else difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {close[0]}?" if close else f"allowed are {', '.join(known)}."
         where = ", where " + " and ".join(f"{field} is {json.dumps(value)}" for field, value in tags) if tags else ""
-        yield f"{path} is not a field of a scenario{where}; {hint}"
+        yield f"{path} is not a field of a {model.__name__.lower()}{where}; {hint}"
     elif kind == "union_tag_not_found":
         yield f"{path} needs the field {problem['ctx']['discriminator']}; it must be one of {_tags(annotation)}."
     elif kind == "union_tag_invalid":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
@@ -18,8 +19,19 @@ def scenario_files() -> dict[str, Path]:
 
 
 def where_to_get(missing: Path) -> str:
-    """A sentence on how to come by a file that is missing, if one of that name comes with the program; or nothing."""
-    names = {file.name for file in scenario_files().values()}
-    if missing.name not in names:
+    """A sentence on how to come by a file that is missing: one of that name or nearly lies near, or comes with the
+    program; or nothing."""
+    if missing.exists():
         return ""
-    return " A file of that name comes with the program: python -m warp_mpm scenarios --out scenarios copies it here."
+    near = [*missing.parent.glob("*.json"), *(missing.parent / "scenarios").glob("*.json")]
+    # Of a name without its ending, in other letters, or mistyped.
+    stem = missing.name.removesuffix(".json").lower()
+    for files, answer in ((near, _MEANT), (scenario_files().values(), _SHIPPED)):
+        names = {file.stem.lower(): file for file in files}
+        for close in difflib.get_close_matches(stem, names, n=1, cutoff=0.8):
+            return answer.format(name=names[close].name, path=names[close])
+    return ""
+
+
+_MEANT = " Did you mean {path}?"
+_SHIPPED = " {name} comes with the program: python -m warp_mpm scenarios --out scenarios copies it here."

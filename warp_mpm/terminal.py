@@ -31,6 +31,9 @@ REFRESH = 0.1
 PLAIN_LINES = 10
 """Lines of progress in a pipe, where there is no bar."""
 
+PIPE_WIDTH = 160
+"""Columns of a table in a pipe or a file, which has no edge to fit to."""
+
 
 class StopOnSignal:
     """Ctrl-C, termination and a terminal that is closed ask the run to stop after its present steps; a second Ctrl-C
@@ -72,6 +75,8 @@ class RunDisplay:
 
     def __init__(self, scenario: Scenario, *, device: str, quiet: bool = False):
         self._console = Console(quiet=quiet, highlight=False, markup=False)
+        if not self._console.is_terminal:
+            self._console.width = PIPE_WIDTH
         self._scenario, self._device = scenario, device
         self._bar: Progress | None = None
         self._task = TaskID(0)

@@ -197,7 +197,7 @@ class _Inputs:
         return self.chosen[name][0]
 
     def needed(self, name: str, text: str | None, parse: Any) -> Any:
-        """As ``choose``, of the text of a number or a distribution, and refused where there is none."""
+        """As `choose`, of the text of a number or a distribution, and refused where there is none."""
         value = self.choose(name, None if text is None else parse(name, text), None)
         if value is None:
             where = " or a scenario of a sliding barrier" if name == "base_friction" else " or a scenario file"

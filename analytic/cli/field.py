@@ -93,7 +93,7 @@ def _quantiles(values: Any) -> tuple[float, float, float]:
 
 
 def _coefficients(texts: list[str]) -> dict[str, dict[str, float]]:
-    """``MODEL.NAME=VALUE`` texts by model."""
+    """`MODEL.NAME=VALUE` texts by model."""
     found: dict[str, dict[str, float]] = {}
     for text in texts:
         parts = re.fullmatch(r"(\w+)\.(\w+)=(.+)", text)

@@ -114,9 +114,9 @@ def assemble(scenario: Path | None, given: dict[str, float | None], fixed: bool)
 
 
 def choose_model(scene: Scene, variant: str, given: dict[str, float | None]) -> tuple[dict[str, Any], list[str]]:
-    """Arguments of ``Scene.impact`` for a variant, the calibrated one included, and what is assumed, in sentences.
+    """Arguments of `Scene.impact` for a variant, the calibrated one included, and what is assumed, in sentences.
 
-    ``given``: what the user states of s1max, geometry_change, rise_ratio and vertical_load_ratio; it goes before the
+    `given`: what the user states of s1max, geometry_change, rise_ratio and vertical_load_ratio; it goes before the
     fitted or assumed values.
     """
     known = [*VARIANTS, CALIBRATED]

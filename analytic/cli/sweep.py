@@ -1,4 +1,4 @@
-"""`python -m analytic sweep plan | collect | fit`: from simulations to the constants of the variant ``calibrated``."""
+"""`python -m analytic sweep plan | collect | fit`: from simulations to the constants of the variant `calibrated`."""
 
 from __future__ import annotations
 

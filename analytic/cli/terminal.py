@@ -61,7 +61,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def write_plot(make: Any, path: Path) -> None:
-    """Draw ``make()`` into ``path`` and say so."""
+    """Draw `make()` into `path` and say so."""
     from analytic import plots
 
     plots.save(make(), path)

@@ -87,10 +87,10 @@ def run_coupled(
     barrier_mass: float | None = None,
     anchor: dict[str, float] | None = None,
 ) -> list[Row]:
-    """Run the three units to ``end`` [s] with a communication step [s]; what is not given is the scenario's.
+    """Run the three units to `end` [s] with a communication step [s]; what is not given is the scenario's.
 
-    ``gauss-seidel`` steps the flow first and passes its mean force over the step to the barrier's step over the same
-    time, so that the barrier receives just the momentum that the flow lost. ``jacobi`` steps all units with what the
+    `gauss-seidel` steps the flow first and passes its mean force over the step to the barrier's step over the same
+    time, so that the barrier receives just the momentum that the flow lost. `jacobi` steps all units with what the
     others gave at the last communication point, as tools do that step them side by side.
     """
     scenario = scenario_in(archives / "DebrisFlowC.fmu")

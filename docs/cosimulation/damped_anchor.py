@@ -23,16 +23,14 @@ def slide(
 ) -> dict[str, float]:
     """Run barrier and anchor.
 
-    Parameters
-    ----------
-    archives: folder with the units.
-    yield_force: of the anchor [N/m]; 0 for none.
-    damping: force of the dashpot per velocity of the barrier [N s/m2].
-    step, end: communication step and end [s].
+    Args:
+        archives: folder with the units.
+        yield_force: of the anchor [N/m]; 0 for none.
+        damping: force of the dashpot per velocity of the barrier [N s/m2].
+        step, end: communication step and end [s].
 
-    Returns
-    -------
-    Final displacement [m], largest anchor force [N/m], and plastic elongation of the anchor [m].
+    Returns:
+        Final displacement [m], largest anchor force [N/m], and plastic elongation of the anchor [m].
     """
     anchor = {"stiffness": 2e5, "yield_force": yield_force or 1.0, "slack": 0.0 if yield_force else 1e3}
     largest = 0.0

@@ -44,12 +44,11 @@ def run(
 ) -> Account:
     """Run the system and keep the account.
 
-    Parameters
-    ----------
-    archives: folder with the units.
-    step, end: communication step and end [s].
-    spacing: of the simulator's grid [m]; 0 takes the scenario's.
-    yield_force: of the anchor [N/m].
+    Args:
+        archives: folder with the units.
+        step, end: communication step and end [s].
+        spacing: of the simulator's grid [m]; 0 takes the scenario's.
+        yield_force: of the anchor [N/m].
     """
     parameters = barrier_parameters(scenario_in(archives / "DebrisFlowC.fmu"))
     weight = parameters["barrier_mass"] * parameters["gravity"]

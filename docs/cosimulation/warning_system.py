@@ -46,14 +46,13 @@ def run(
 ) -> Warned:
     """Run the flow until it is at the barrier.
 
-    Parameters
-    ----------
-    archives: folder with the unit.
-    threshold: depth at the gauge that raises the alarm [m].
-    gauge: its place along x [m]; the toe of the barrier is at 0.
-    delay, closing: of the signal, and of the gate [s].
-    step, end: communication step and end [s].
-    spacing: of the simulator's grid [m]; 0 takes the scenario's.
+    Args:
+        archives: folder with the unit.
+        threshold: depth at the gauge that raises the alarm [m].
+        gauge: its place along x [m]; the toe of the barrier is at 0.
+        delay, closing: of the signal, and of the gate [s].
+        step, end: communication step and end [s].
+        spacing: of the simulator's grid [m]; 0 takes the scenario's.
     """
     found = Warned()
     with instance_of(archives / "DebrisFlowC.fmu") as flow:

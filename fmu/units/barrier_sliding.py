@@ -223,7 +223,7 @@ INTERFACE = Interface(
 
 
 def check_friction(base_friction: float, slope: float, vertical_load_ratio: float) -> None:
-    """What ``Impact`` demands of a base friction, for one that is changed between steps."""
+    """What `Impact` demands of a base friction, for one that is changed between steps."""
     steepest = abs(math.tan(math.radians(slope)))
     if steepest > 0 and base_friction <= steepest:
         raise UnitError(
@@ -249,7 +249,7 @@ class Loads:
 class SlidingBarrier:
     """The barrier between two communication points.
 
-    As long as no load acts from outside, the barrier follows ``Impact``, which is a function of time alone: any steps
+    As long as no load acts from outside, the barrier follows `Impact`, which is a function of time alone: any steps
     lead to the same trajectory. From the first load on it is integrated from step to step, exactly for loads that are
     constant over a step.
     """
@@ -282,7 +282,7 @@ class SlidingBarrier:
         self.force, self.peak_force, self.phase = impact.force(time), impact.peak_force, impact.phase(time)
 
     def advance(self, end: float, loads: Loads) -> None:
-        """Go on to the time ``end`` [s] under the loads."""
+        """Go on to the time `end` [s] under the loads."""
         impact = self.impact
         tuned = not impact.fixed and loads.base_friction != self.base_friction
         acted = loads.external_force or loads.vertical_load or tuned
@@ -364,7 +364,7 @@ class SlidingBarrier:
 
 
 class BarrierSlidingSlave(UnitSlave):
-    """``SlidingBarrier`` as a co-simulation unit."""
+    """`SlidingBarrier` as a co-simulation unit."""
 
     interface = INTERFACE
     barrier: SlidingBarrier

@@ -282,5 +282,5 @@ class DebrisFlowSlave(UnitSlave):
             if snapshot is not None and isinstance(snapshot["worker_state"], WorkerState):
                 snapshot = {**snapshot, "worker_state": snapshot["worker_state"].data()}
             return sealed(json.dumps({**state, "snapshot": snapshot}).encode())
-        except UnitError as error:  # no exception may go to the wrapper from here, see ``_fmu_state_from_bytes``
+        except UnitError as error:  # no exception may go to the wrapper from here, see `_fmu_state_from_bytes`
             return sealed(json.dumps({"fault": f"The state could not be serialized: {error}"}).encode())

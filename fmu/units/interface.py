@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 Value = float | int | bool | str
 
 SMALLEST_ABOVE_NIL = sys.float_info.min
-"""The standard's ``min`` includes its number, so a range that begins above nil is told with this one."""
+"""The standard's `min` includes its number, so a range that begins above nil is told with this one."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ class Choice:
 class Variable:
     """One variable of a unit.
 
-    ``kind`` is ``Real``, ``Integer`` (a choice), ``Boolean`` or ``String``; ``causality`` is ``parameter``, ``input``
-    or ``output``. ``start`` is given for parameters and inputs alone: outputs are calculated. ``minimum`` and
-    ``maximum`` bound the value; with ``open_minimum`` the minimum itself is refused. A ``tunable`` parameter may be
+    `kind` is `Real`, `Integer` (a choice), `Boolean` or `String`; `causality` is `parameter`, `input`
+    or `output`. `start` is given for parameters and inputs alone: outputs are calculated. `minimum` and
+    `maximum` bound the value; with `open_minimum` the minimum itself is refused. A `tunable` parameter may be
     changed between steps and acts from the next one on.
     """
 
@@ -130,7 +130,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Interface:
-    """All that an importer sees of a unit. A variable's value reference is its place in ``variables``."""
+    """All that an importer sees of a unit. A variable's value reference is its place in `variables`."""
 
     name: str
     description: str

@@ -1,4 +1,4 @@
-"""A unit's ``modelDescription.xml`` (FMI 2.0.2 for co-simulation) from its table of variables."""
+"""A unit's `modelDescription.xml` (FMI 2.0.2 for co-simulation) from its table of variables."""
 
 from __future__ import annotations
 
@@ -31,15 +31,14 @@ def guid(interface: Interface, version: str) -> str:
 def model_description(
     interface: Interface, *, version: str, tool: str, needs_execution_tool: bool, source_files: tuple[str, ...] = ()
 ) -> Element:
-    """The root element of ``modelDescription.xml``.
+    """The root element of `modelDescription.xml`.
 
-    Parameters
-    ----------
-    interface: the table; its name is also the model identifier, the file name of the binaries.
-    version: version and content stamp of the code inside.
-    tool: what generated the archive.
-    needs_execution_tool: whether the importer's machine must offer more than the archive, here a Python.
-    source_files: names of the C files, for an archive that has them.
+    Args:
+        interface: the table; its name is also the model identifier, the file name of the binaries.
+        version: version and content stamp of the code inside.
+        tool: what generated the archive.
+        needs_execution_tool: whether the importer's machine must offer more than the archive, here a Python.
+        source_files: names of the C files, for an archive that has them.
     """
     root = Element(
         "fmiModelDescription",

@@ -73,8 +73,8 @@ def _sentence(error: BaseException) -> str:
 class UnitSlave(Fmi2Slave):
     """Base of all units.
 
-    A unit gives its table and the hooks ``start``, ``step``, ``snapshot``, ``restore`` and ``close``. Variables are
-    kept in ``values``, in the order of the table. They are deliberately not registered with pythonfmu: its getters form
+    A unit gives its table and the hooks `start`, `step`, `snapshot`, `restore` and `close`. Variables are
+    kept in `values`, in the order of the table. They are deliberately not registered with pythonfmu: its getters form
     reference cycles, which would put off the release of a freed instance.
     """
 
@@ -114,15 +114,15 @@ class UnitSlave(Fmi2Slave):
         raise NotImplementedError
 
     def step(self, end: float) -> None:
-        """Go from ``self.time`` to the time ``end`` [s] and set the outputs."""
+        """Go from `self.time` to the time `end` [s] and set the outputs."""
         raise NotImplementedError
 
     def snapshot(self) -> Any:
-        """All that the unit remembers beside ``values`` and ``time``, as JSON can hold it."""
+        """All that the unit remembers beside `values` and `time`, as JSON can hold it."""
         raise NotImplementedError
 
     def restore(self, snapshot: Any) -> None:
-        """Take back what ``snapshot`` gave."""
+        """Take back what `snapshot` gave."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -362,7 +362,7 @@ def sealed(data: bytes) -> bytes:
 
 
 def opened(data: bytes) -> bytes:
-    """What ``sealed`` was given."""
+    """What `sealed` was given."""
     digest, _, content = data.partition(b"\n")
     if hashlib.sha256(content).hexdigest().encode() != digest:
         raise UnitError("The bytes are not a state of this unit, or are damaged.")

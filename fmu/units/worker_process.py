@@ -49,11 +49,11 @@ LAUNCH = "import sys; sys.path[:0] = sys.argv[1:]; from fmu.worker import main; 
 
 
 class WorkerProcess:
-    """One worker; started at once, ended by ``close`` or when this object is released.
+    """One worker; started at once, ended by `close` or when this object is released.
 
-    Raises
-    ------
-    UnitError: there is no interpreter, it does not start, or it has no simulator; one sentence that says what to do.
+    Raises:
+        UnitError: there is no interpreter, it does not start, or it has no simulator; one sentence that says what to
+            do.
     """
 
     def __init__(self, resources: str) -> None:
@@ -100,9 +100,8 @@ class WorkerProcess:
     def ask(self, request: str, time_limit: float, **arguments: Any) -> dict[str, Any]:
         """Send a request and wait for its answer.
 
-        Raises
-        ------
-        UnitError: the simulator refused or failed, the worker died, or it did not answer in time and was ended.
+        Raises:
+            UnitError: the simulator refused or failed, the worker died, or it did not answer in time and was ended.
         """
         if self._process is None or self._process.stdin is None:
             raise UnitError("The simulator's process has ended.")
@@ -182,9 +181,8 @@ class WorkerProcess:
 def find_interpreter(resources: str) -> tuple[str, list[str]]:
     """The Python for the worker, and what it must add to its import path.
 
-    Raises
-    ------
-    UnitError: neither the environment variable nor the archive's record names a file that is there.
+    Raises:
+        UnitError: neither the environment variable nor the archive's record names a file that is there.
     """
     chosen = os.environ.get(INTERPRETER_VARIABLE)
     if chosen:

@@ -57,6 +57,8 @@ def test_limits_as_they_are_typed(text, name, bound, least):
         ("displacement <= 3 kg", "kg is no unit of it; it must be one of m."),
         ("sliding_factor <= 1.5", "it must be sliding_factor >= NUMBER"),
         ("barrier_at_rest <= 1", "there is no such figure"),
+        ("barriers <= 1", "there is no such figure"),
+        ("time_step_limit <= 1", "there is no such figure"),
     ],
 )
 def test_what_is_no_limit(text, sentence):

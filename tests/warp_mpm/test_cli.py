@@ -61,6 +61,12 @@ def test_run_fills_the_default_folder_and_tells_the_figures(command):
     assert "\x1b" not in result.stdout
 
 
+def test_a_figure_has_one_line_in_a_file_however_narrow_the_terminal(command, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = [line.rstrip() for line in run(command, "--no-pictures").stdout.splitlines()]
+    assert any(line.startswith("volume [m³/m] ") and line.endswith(" beyond") for line in lines)
+
+
 def test_brackets_in_a_title_are_only_brackets(command):
     Path("scene.json").write_text(json.dumps({**json.loads(Path(SET_IIB).read_text()), "title": "[bold]a[/] [/x]"}))
     result = command("run", "scene.json", "--spacing", "0.5", "--until", "0.5")

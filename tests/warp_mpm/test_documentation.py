@@ -13,10 +13,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+import typer
 
 import analytic.cli
+import fmu.cli
 import warp_mpm.cli
+from warp_mpm.commands.plot import Kind
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("index", "api")
@@ -64,20 +66,68 @@ def test_page_does_what_it_says(page, folder):
             assert answer.returncode == 0, f"{' '.join(command[1:])}\n{answer.stdout}\n{answer.stderr}"
 
 
-def test_commands_of_the_papers_figures_exist():
-    """The figures themselves need minutes of runs; here, that each command is one and its scenes are there."""
+COMMAND_LINES = {
+    "warp_mpm": typer.main.get_command(warp_mpm.cli.app),
+    "analytic": typer.main.get_command(analytic.cli.app),
+    "fmu": typer.main.get_command(fmu.cli.app),
+}
+WRITTEN = sorted([*ROOT.glob("*.md"), ROOT / "Makefile", *(ROOT / "docs").rglob("*.md")])
+
+
+def with_commands_of(command):
+    return [command, *(one for below in getattr(command, "commands", {}).values() for one in with_commands_of(below))]
+
+
+def options_of(command):
+    return {"--help", *(option for one in command.params for option in (*one.opts, *one.secondary_opts))}
+
+
+def test_commands_of_the_pages_exist():
+    """With their options, wherever a page, a table or a remark names one; what they do, the blocks above show."""
+    seen = 0
+    for page in WRITTEN:
+        for module, rest in re.findall(
+            r"python -m (warp_mpm|analytic|fmu) ([^\n`#]+)", page.read_text().replace("\\\n", " ")
+        ):
+            command, words = COMMAND_LINES[module], rest.split()
+            while words and words[0] in getattr(command, "commands", {}):
+                command = command.commands[words.pop(0)]
+                seen += 1
+            assert command is not COMMAND_LINES[module] or words[0] in ("…", "..."), (page.name, rest)
+            options = {word.partition("=")[0] for word in words if re.match("--[a-z]", word)}
+            assert options <= options_of(command), (page.name, rest)
+    assert seen > 100
+
+
+def test_the_page_of_the_commands_has_a_row_for_each():
+    rows = re.findall(r"^\| `([a-z-]+)", (ROOT / "docs/commands.md").read_text(), re.MULTILINE)
+    assert {*COMMAND_LINES["warp_mpm"].commands} <= {*rows}
+
+
+def test_options_and_pictures_that_the_prose_names_exist():
+    options = {
+        option for line in COMMAND_LINES.values() for one in with_commands_of(line) for option in options_of(one)
+    }
+    for page in WRITTEN:
+        text = page.read_text()
+        assert set(re.findall(r"`(--[a-z][a-z-]*)", text)) <= options, page.name
+        assert set(re.findall(r"`(?:python -m warp_mpm )?plot ([a-z]+)`", text)) <= {*Kind}, page.name
+
+
+def test_scenes_of_the_papers_figures_exist():
     text = (ROOT / "docs/paper_figures.md").read_text()
-    commands = re.findall(r"`(python -m [^`]+)`", text)
-    assert len(commands) >= 12
-    apps = {"warp_mpm": warp_mpm.cli.app, "analytic": analytic.cli.app}
-    for command in commands:
-        module, verb = command.split()[2:4]
-        answer = CliRunner().invoke(apps[module], [verb, "--help"], env={"COLUMNS": "200"})
-        assert answer.exit_code == 0, command
-        for run in re.findall(r"runs/paper/(\w+)", command):
-            assert (ROOT / "scenarios" / f"{run}.json").exists(), run
-        for option in re.findall(r"--[a-z-]+", command):
-            assert option in answer.stdout, (command, option)
+    runs = re.findall(r"runs/paper/(\w+)", text)
+    assert len(set(runs)) > 15
+    assert all((ROOT / "scenarios" / f"{run}.json").exists() for run in runs)
+
+
+def test_every_row_belongs_to_a_table():
+    """A blank line in a table leaves what follows it as bare text."""
+    for page in WRITTEN:
+        lines = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.DOTALL | re.MULTILINE).splitlines()
+        for before, line, after in zip(["", *lines], lines, [*lines[1:], ""], strict=False):
+            if line.startswith("|") and not before.startswith("|"):
+                assert re.fullmatch(r"\|[ :|-]+", after), (page.name, line[:60])
 
 
 def test_navigation_leads_to_pages():

@@ -8,11 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from warp_mpm.engine import Processes, Standing, Task
+from warp_mpm.engine import Processes, Standing, Task, cores
 from warp_mpm.results import Results
 from warp_mpm.sweep import SweepError, study
 
 ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no shares of cores to ask for here")
+def test_no_more_cores_than_this_process_may_use(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5})
+    monkeypatch.setattr(os, "cpu_count", lambda: 64)
+    assert cores() == 2
 
 
 def test_results_and_problems_of_tasks():

@@ -343,6 +343,13 @@ def test_broken_file(tmp_path, content, sentence):
     assert str(caught.value).startswith(str(path))
 
 
+def test_a_sweep_is_no_scenario(tmp_path):
+    path = tmp_path / "sweep.json"
+    path.write_text('{"scenario": "case_1.json", "method": "list", "vary": {"gravity.tilt_deg": {"values": [1, 2]}}}')
+    with pytest.raises(ScenarioError, match=r"sweep\.json: This is a sweep; python -m warp_mpm sweep runs it\.$"):
+        Scenario.load(path)
+
+
 def test_missing_file(tmp_path):
     with pytest.raises(ScenarioError, match="Cannot read the scenario: No such file"):
         Scenario.load(tmp_path / "none.json")

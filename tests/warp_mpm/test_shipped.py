@@ -92,6 +92,18 @@ def test_a_scene_that_is_not_there_is_told_where_to_get(tmp_path):
     assert "comes with" not in str(other.value)
 
 
+@pytest.mark.parametrize("name", ["case1.json", "case_1", "CASE1"])
+def test_a_scene_whose_name_is_mistyped_is_told_which_is_meant(tmp_path, name):
+    with pytest.raises(ScenarioError, match=r"directory\. case_1\.json comes with the program"):
+        Scenario.load(tmp_path / name)
+    for place in (tmp_path / "scenarios" / "case_1.json", tmp_path / "case_1.json"):
+        place.parent.mkdir(exist_ok=True)
+        place.write_text("{}")
+        with pytest.raises(ScenarioError, match=rf"directory\. Did you mean {place}\?"):
+            Scenario.load(tmp_path / name)
+        place.unlink()
+
+
 @pytest.mark.parametrize("app", [warp_mpm.cli.app, analytic.cli.app, fmu.cli.app])
 def test_version(app):
     answer = CliRunner().invoke(app, ["--version"])

@@ -107,6 +107,8 @@ def test_distributions_have_their_moments(load, distribution, mean, deviation):
         (sweep_of("list", {SPEED: {"values": [1]}, MASS: {"values": [1, 2]}}), "as many values of each field"),
         (sweep_of("grid", {SPEED: {"values": [1], "uniform": [1, 2]}}), "needs exactly one of values, range"),
         (sweep_of("grid", {}), "vary"),
+        (sweep_of("grid", {SPEED: {"values": [1]}}) | {"vari": {}}, "vari is not a field of a sweep; did you mean"),
+        (json.loads(SET_IIB.read_text()), "This is a scenario; a sweep is a file that names one and"),
         (
             sweep_of("grid", {SPEED: {"range": [0.3, 0.6]}}),
             r"range = \[0.3, 0.6\] is not allowed; it must be a list of 3 numbers: first, last and number of evenly",

@@ -19,9 +19,8 @@ SYNONYMS = {"overtopped": "overtopped_share", "peak": "peak_force_filtered", "ru
 """Shorter words for figures."""
 
 FIGURES_OF_LIMITS: Mapping[str, Quantity] = {
-    name: quantity
-    for name, quantity in {**FIGURES, **CHECKS}.items()
-    if name not in ("barrier_at_rest", "force_still_rises", "wall_time")
+    **{name: figure for name, figure in FIGURES.items() if figure.number and name != "wall_time"},
+    **CHECKS,
 }
 """What a limit may be on: the numbers of `summary.json` and of its verdict, whose words come first."""
 

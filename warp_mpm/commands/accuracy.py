@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -77,6 +76,7 @@ def accuracy(
         from warp_mpm.accuracy.report import place_in, put_into_page, study_block, write_ladders, write_study
         from warp_mpm.accuracy.runner import run_settings
         from warp_mpm.accuracy.study import FULL_LADDER, QUICK_LADDER, known_ladder, plan
+        from warp_mpm.engine import cores
         from warp_mpm.scenario import Scenario
 
         scenes = [with_options(Scenario.load(path), spacing=None, until=until) for path in scenarios]
@@ -87,7 +87,7 @@ def accuracy(
         if check:
             if len(scenes) != 1 or data is not None or quick:
                 raise ValueError("--check draws scenes around one scenario; --quick and --data do not go with it.")
-            _check(scenes[0], folder, page, jobs or os.cpu_count() or 1)
+            _check(scenes[0], folder, page, jobs or cores())
             return
         if data is not None and not data.parent.is_dir():
             raise ValueError(f"--data {data} must be a file in a folder that exists.")
@@ -104,7 +104,7 @@ def accuracy(
                 results = run_settings(
                     [setting for settings in plans for setting in settings],
                     folder / "results",
-                    jobs=jobs or os.cpu_count() or 1,
+                    jobs=jobs or cores(),
                     on_progress=show,
                 )
         except KeyboardInterrupt:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from pathlib import Path
 from signal import SIGTERM
 from typing import Any
@@ -47,6 +46,7 @@ def run_several(
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from warp_mpm.batch import Job, JobEnd, run_jobs
+    from warp_mpm.engine import cores
     from warp_mpm.recording.run_folder import RunFolder
     from warp_mpm.scenario import Scenario
     from warp_mpm.terminal import StopOnSignal
@@ -86,7 +86,7 @@ def run_several(
 
         ends = run_jobs(
             planned,
-            at_once=jobs or os.cpu_count() or 1,
+            at_once=jobs or cores(),
             on_start=began,
             on_progress=lambda job, time: bars.update(tasks[job.name], completed=time, state=f"t = {time:.2f} s"),
             on_end=ended,

@@ -18,6 +18,8 @@ class Figure(Quantity):
     """Names of the columns of the time series without which it is not known."""
     short: str = ""
     """For the heading of a column of a table; empty: the symbol, or the words."""
+    number: bool = True
+    """Whether it is one, and no word, table, or yes or no."""
 
     @property
     def column(self) -> str:
@@ -27,25 +29,52 @@ class Figure(Quantity):
 
 FORCE = ("impact_force_x",)
 
+
+def _time(of: str, when: str) -> Figure:
+    """The time of a greatest value."""
+    return Figure(f"{of}_time", "s", f"time of {of}: {when}")
+
+
+_MIDDLE = f"middle of the {FILTER_WINDOW:g} s that the moving mean is taken over, as far as the record reaches"
+_PATCH_END = "end of the time over which it is a mean"
+
 PATCH = (
     "output.pressure_patch_m of the face and output.pressure_patch_s (0.5 m and 20 ms unless given), or over a cell "
     "and an interval of the time series where these are greater"
 )
 
 _ROWS = (
+    Figure("end_time", "s", "simulated time at which the run ended"),
+    Figure("status", "-", "finished; or stopped or failed, before its end time", number=False),
+    Figure("material_points", "-", "number of material points, with those that arrive later"),
+    Figure("steps", "-", "number of time steps"),
+    Figure("time_step_min", "s", "smallest time step, those that land on a record or on the end included"),
+    Figure("time_step_max", "s", "greatest time step"),
+    Figure(
+        "time_step_limit", "-",
+        "what set most time steps: wave (the fastest wave and speed), drag (explicit drag), law (the skeleton's law), "
+        "output (landing on a record)",
+        number=False,
+    ),
     Figure(
         "peak_force", "N/m",
         "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
-        "its time is the end of that interval; where force_still_rises, that so far, at least",
+        "where force_still_rises, that so far, at least",
         "peak force", needs=FORCE,
     ),
-    Figure("peak_force_time", "s", "end of the interval of peak_force", "time of the peak"),
+    Figure("peak_force_time", "s", "time of peak_force: end of the interval", "time of the peak"),
     Figure(
-        "peak_force_filtered", "N/m", f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
+        "peak_force_filtered", "N/m",
+        f"greatest moving mean over {FILTER_WINDOW:g} s of the horizontal force on the impacted face; where "
+        "force_still_rises, that so far, at least",
         f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=FORCE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
     ),
+    _time("peak_force_filtered", _MIDDLE),
     Figure(
-        "force_still_rises", "-", "whether that moving mean is greatest where the run ends; null without an impact",
+        "force_still_rises", "-",
+        f"whether the force's moving mean over {FILTER_WINDOW:g} s is greatest where the run ends; null without an "
+        "impact",
+        number=False,
     ),
     Figure(
         "impact_start_time", "s", f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
@@ -75,15 +104,18 @@ _ROWS = (
         "impulse", needs=FORCE,
     ),
     Figure(
-        "impact_impulse", "N s/m", "the same from impact_start_time to impact_end_time", "impulse until T₂",
-        needs=FORCE,
+        "impact_impulse", "N s/m",
+        "time integral of the horizontal force on the impacted face from impact_start_time to impact_end_time",
+        "impulse until T₂", needs=FORCE,
     ),
     Figure(
         "barrier_velocity_max", "m/s", "greatest velocity downstream; 0 of a barrier that only slides upstream",
         "greatest barrier velocity", needs=("barrier_velocity",), short="v₂,max",
     ),
+    _time("barrier_velocity_max", "end of the interval"),
     Figure(
-        "barrier_displacement_final", "m", "at the end of the run; not final unless barrier_at_rest",
+        "barrier_displacement_final", "m",
+        "displacement of the barrier along x at the end of the run; not final unless barrier_at_rest",
         "sliding distance", "Δx", needs=("barrier_displacement",),
     ),
     Figure(
@@ -91,7 +123,7 @@ _ROWS = (
     ),
     Figure(
         "barrier_at_rest", "-", "whether a sliding barrier stands still at the end of the run",
-        needs=("barrier_velocity",),
+        needs=("barrier_velocity",), number=False,
     ),
     Figure(
         "peak_force_height", "m",
@@ -104,19 +136,23 @@ _ROWS = (
         f"greatest moment of the flow on the barrier about its toe, of the moving mean over {FILTER_WINDOW:g} s",
         f"greatest moment about the toe, {FILTER_WINDOW:g} s mean", "M_toe", needs=("toe_moment",),
     ),
+    _time("toe_moment_filtered", _MIDDLE),
     Figure(
         "heel_moment_filtered", "N m/m",
         f"greatest moment of the flow that overturns the barrier about its heel, of the moving mean over "
         f"{FILTER_WINDOW:g} s; its own weight is not counted; null of a wall, which has no heel",
         f"greatest moment about the heel, {FILTER_WINDOW:g} s mean", "M_heel", needs=("heel_moment",),
     ),
+    _time("heel_moment_filtered", _MIDDLE),
     Figure(
         "pressure_patch_max", "Pa",
         f"greatest normal pressure of the flow on the impacted face, of both phases, as a mean over {PATCH}",
         "greatest pressure on the face", "p_max", needs=("pressure_patch",),
     ),
+    _time("pressure_patch_max", _PATCH_END),
     Figure(
-        "pressure_patch_max_height", "m", "height of the middle of that patch above the barrier's base",
+        "pressure_patch_max_height", "m",
+        "height above the barrier's base of the middle of the patch of pressure_patch_max",
         "height of the greatest pressure", needs=("pressure_patch", "pressure_patch_height"),
     ),
     Figure(
@@ -124,7 +160,8 @@ _ROWS = (
         "length of the patch",
     ),
     Figure(
-        "pressure_patch_s", "s", "time over which the pressure on that patch is a mean", "time of the patch's mean",
+        "pressure_patch_s", "s", "time over which pressure_patch_max and pore_pressure_patch_max are means",
+        "time of the patch's mean",
     ),
     Figure(
         "pore_pressure_patch_max", "Pa",
@@ -132,8 +169,10 @@ _ROWS = (
         "face, where it is not told apart",
         "greatest pore pressure on the face", "p_L", needs=("pore_pressure_patch",),
     ),
+    _time("pore_pressure_patch_max", _PATCH_END),
     Figure(
-        "pore_pressure_patch_max_height", "m", "height of the middle of that patch above the barrier's base",
+        "pore_pressure_patch_max_height", "m",
+        "height above the barrier's base of the middle of the patch of pore_pressure_patch_max",
         "height of the greatest pore pressure", needs=("pore_pressure_patch", "pore_pressure_patch_height"),
     ),
     Figure(
@@ -142,6 +181,7 @@ _ROWS = (
         "of the crest where it went over",
         "run-up on the face", "h_r", needs=("run_up",),
     ),
+    _time("run_up_max", _PATCH_END),
     Figure(
         "pore_pressure_max", "Pa",
         "greatest pore pressure upstream of the barrier's crest at any sample, meant over a cell alone: at the "
@@ -149,12 +189,16 @@ _ROWS = (
         "for",
         "greatest pore pressure in a cell", needs=("pore_pressure_max",),
     ),
+    _time("pore_pressure_max", "that of the sample"),
     Figure(
         "pore_pressure_max_anywhere", "Pa",
         "greatest pore pressure of any single material point, noise and jets included. It may grow with each "
         "refinement",
         "greatest pore pressure of a point", needs=("pore_pressure_max_anywhere",),
     ),
+    _time("pore_pressure_max_anywhere", "that of the sample"),
+    Figure("initial_volume", "m3/m", "volume of what is there at the start, deposits included"),
+    Figure("left_volume", "m3/m", "what has left the domain until the end, at the flow's initial density"),
     Figure(
         "retained_volume", "m3/m", "material upstream of the crest at the end, at the flow's initial density",
         "volume retained", short="retained",
@@ -165,7 +209,7 @@ _ROWS = (
     ),
     Figure(
         "overtopped_volume", "m3/m",
-        "material beyond the crest at the end; left_volume is what has left the domain",
+        "material beyond the crest at the end, without what has left the domain (left_volume)",
         "volume overtopped", short="beyond",
     ),
     Figure(
@@ -203,6 +247,19 @@ _ROWS = (
         "of a scene with further barriers: a row for each, from upstream to downstream, with the force on the whole of "
         "it, its motion, the volumes held before and passed beyond its crest at the end, and how far from its heel the "
         "first of what passed was on the ground (docs/how_to/site.md)",
+        number=False,
+    ),
+    Figure(
+        "mechanism_measures", "-",
+        "what the mechanism rests on, over all snapshots: greatest share of the flow past the crest and a depth above "
+        "it (airborne_share), greatest share beyond the crest (overtopped_share), greatest depth upstream of the toe "
+        "over the flow's (jump_depth_ratio), greatest height of material upstream of the crest (run_up) [m]",
+        number=False,
+    ),
+    Figure(
+        "not_recorded", "-",
+        "figures that are not known because output.quantities leaves out columns that they are taken from, with these",
+        number=False,
     ),
     Figure("wall_time", "s", "wall time of the run, its preparation left out", "wall time"),
 )  # fmt: skip

@@ -199,7 +199,8 @@ _ROWS = (
         of_points=False,
     ),
     Sampled(
-        "pressure_patch_height", "m", "height of the middle of that patch above the barrier's base; 0 without pressure",
+        "pressure_patch_height", "m",
+        "height above the barrier's base of the middle of the patch of greatest pressure; 0 without pressure",
         "height of the patch of greatest pressure", read=lambda now: now.loads.pressure_patch.height, there=barrier,
         of_points=False,
     ),

@@ -8,7 +8,6 @@ process that is killed leaves a file that opens.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,15 @@ import numpy as np
 from warp_mpm.kernels import layout as at
 from warp_mpm.quantities.time_series import liquid as holds_liquid
 from warp_mpm.quantities.time_series import two_phases
-from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.hdf5 import (
+    bring_to_the_disk,
+    created,
+    failures_of_the_disk,
+    reopened,
+    room_for,
+    set_aside,
+)
 from warp_mpm.recording.schedule import Schedule
-from warp_mpm.recording.snapshots import FILE_OPTIONS, failures_of_the_disk
 from warp_mpm.simulator.bodies.loads import Stretch
 
 MEANINGS = {
@@ -31,6 +36,9 @@ MEANINGS = {
     "pore_pressure": "pressure of the liquid, mean over the interval",
 }
 """Data sets of a surface [times, n] in Pa."""
+
+LARGEST_CHUNK = 1024
+"""Times that lie together in the file."""
 
 
 class LoadsRecorder:
@@ -46,31 +54,23 @@ class LoadsRecorder:
         """
         self.schedule = Schedule(interval)
         self._path = path
-        self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
+        self._room = room_for(interval, end_time)
         self._rows = 0
         self._before: tuple[float, np.ndarray] | None = None
         self._file: h5py.File | None = None
         if mark is None:
-            self._file = h5py.File(path, "x", **FILE_OPTIONS)
+            self._file = created(path)
             self._file.attrs["rows"] = 0
             return
         self.schedule.count, self._rows = mark["records"], mark["rows"]
         self._before = (mark["time"], np.array(mark["taken"])) if mark["rows"] else None
-        try:
-            self._file = file = h5py.File(path, "r+", **FILE_OPTIONS)
+        with reopened(path) as file:
+            self._file = file
             if int(file.attrs["rows"]) < self._rows:
                 raise ValueError("it does not reach to the checkpoint")
             for dataset in self._datasets():
                 dataset.resize(self._room, axis=0)
             file.attrs.modify("rows", self._rows)
-            file.flush()
-        except (OSError, KeyError, ValueError, RuntimeError) as error:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-            if isinstance(error, OSError) and error.errno is not None:
-                raise RunFolderError(f"{path} cannot be read: {os.strerror(error.errno)}.") from None
-            raise RunFolderError(f"{path} is damaged: {error}.") from None
 
     def _datasets(self) -> list[h5py.Dataset]:
         """Those with a row for each time."""
@@ -84,12 +84,7 @@ class LoadsRecorder:
     def mark(self) -> dict[str, Any]:
         """Bring everything to the disk and tell where the file stands."""
         assert self._file is not None
-        self._file.flush()
-        descriptor = os.open(self._path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        bring_to_the_disk(self._file, self._path)
         time, taken = self._before if self._before is not None else (0.0, np.zeros(0))
         return {"records": self.schedule.count, "rows": self._rows, "time": time, "taken": taken.tolist()}
 
@@ -119,8 +114,8 @@ class LoadsRecorder:
     def _lay_out(self, simulation: Any) -> None:
         """Create every group and data set, with room for all rows."""
         assert self._file is not None
-        file, room = self._file, self._room
-        _dataset(file, "time", (room,)).attrs["unit"] = "s"
+        file, room, chunk = self._file, self._room, min(self._room, LARGEST_CHUNK)
+        set_aside(file, "time", (room,), chunk=chunk).attrs["unit"] = "s"
         for stretch in simulation.slots.stretches:
             group = file.create_group(stretch.surface)
             x, y = stretch.place(stretch.edges).T
@@ -128,7 +123,7 @@ class LoadsRecorder:
                 group[name] = values
                 group[name].attrs["unit"] = "m"
             for name in pressures(np.zeros((len(stretch), at.SLOT_SIZE)), stretch, simulation.scenario):
-                dataset = _dataset(group, name, (room, len(stretch)))
+                dataset = set_aside(group, name, (room, len(stretch)), chunk=chunk)
                 dataset.attrs["unit"], dataset.attrs["meaning"] = "Pa", MEANINGS[name]
         file.flush()
 
@@ -178,13 +173,3 @@ def pressures(mean: np.ndarray, stretch: Stretch, scenario: Any) -> dict[str, np
     found = {"normal": normal, "shear": along}
     # Of one phase the liquid's pressure is found for friction alone.
     return found | ({"pore_pressure": liquid} if rough and holds_liquid(scenario) else {})
-
-
-def _dataset(group: h5py.Group, name: str, shape: tuple[int, ...]) -> h5py.Dataset:
-    """One whose room is set aside at once, so that filling it changes nothing in the file's structure."""
-    creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    creation.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    creation.set_chunk((min(shape[0], 1024), *shape[1:]))
-    space = h5py.h5s.create_simple(shape, (h5py.h5s.UNLIMITED, *shape[1:]))
-    kind = h5py.h5t.py_create(np.dtype(np.float64), logical=True)
-    return h5py.Dataset(h5py.h5d.create(group.id, name.encode(), kind, space, dcpl=creation))

@@ -7,9 +7,7 @@ unit of a field is its data set's attribute `unit`: a slash in a name would be a
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +15,18 @@ import h5py
 import numpy as np
 
 from warp_mpm.quantities.points import POINT_FIELDS
-from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.hdf5 import (
+    bring_to_the_disk,
+    created,
+    failures_of_the_disk,
+    fill,
+    reopened,
+    room_for,
+    set_aside,
+)
 from warp_mpm.recording.schedule import Schedule
 
 VTK_VERTEX = 1
-
-FILE_OPTIONS = {"libver": ("earliest", "v108"), "locking": False, "rdcc_nbytes": 0}
-"""Newer versions of the format mark a file that is open for writing, and a mark left by a killed process bars readers.
-Without a cache for chunks, numbers go to the file as they are written, not at some later flush."""
 
 FILLED = (
     "Points",
@@ -55,7 +57,7 @@ class SnapshotRecorder:
         """
         self.schedule = Schedule(interval)
         self._path = path
-        self._room = int(end_time / interval * (1.0 + 1e-9)) + 3
+        self._room = room_for(interval, end_time)
         self._count = 0
         self._points = 0
         self._file: h5py.File | None = None
@@ -65,7 +67,7 @@ class SnapshotRecorder:
         self._filled: dict[str, h5py.Dataset] = {}
         self._buffers: dict[str, np.ndarray] = {}
         if mark is None:
-            self._file = h5py.File(path, "x", **FILE_OPTIONS)
+            self._file = created(path)
             self._root = self._file.create_group("VTKHDF")
         else:
             self._reopen(mark)
@@ -73,8 +75,8 @@ class SnapshotRecorder:
     def _reopen(self, mark: Mapping[str, int]) -> None:
         self.schedule.count = mark["records"]
         self._count, self._points = mark["snapshots"], mark["points"]
-        try:
-            self._file = file = h5py.File(self._path, "r+", **FILE_OPTIONS)
+        with reopened(self._path) as file:
+            self._file = file
             self._root = root = file["VTKHDF"]
             self._steps = steps = root["Steps"]
             if min(len(steps["Values"]), int(steps.attrs["NSteps"])) < self._count:
@@ -82,24 +84,20 @@ class SnapshotRecorder:
             self._fields = dict(root["PointData"].items())
             # A stop gave back the room that was not used.
             number, room = len(root["Connectivity"]), self._room
-            for dataset in (root["Points"], root["Types"], *self._fields.values()):
-                dataset.resize(room * number, axis=0)
-            root["Offsets"].resize(room * (number + 1), axis=0)
-            root["NumberOfPoints"].resize(room, axis=0)
-            root["FieldData/barrier_displacement"].resize(room, axis=0)
-            steps.visititems(lambda _, item: item.resize(room, axis=0) if isinstance(item, h5py.Dataset) else None)
+            self._resize(room * number, room * (number + 1), room)
             self._set_constants()
             steps["Values"].resize(self._count, axis=0)
             steps.attrs.modify("NSteps", self._count)
             self._filled = {name: root[name] for name in FILLED}
-            file.flush()
-        except (OSError, KeyError, ValueError, RuntimeError) as error:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-            if isinstance(error, OSError) and error.errno is not None:  # of the system, not of what is in the file
-                raise RunFolderError(f"{self._path} cannot be read: {os.strerror(error.errno)}.") from None
-            raise RunFolderError(f"{self._path} is damaged: {error}.") from None
+
+    def _resize(self, points: int, offsets: int, steps: int) -> None:
+        """Change the room to so many rows of points, of offsets of cells, and of time steps."""
+        for dataset in (self._root["Points"], self._root["Types"], *self._fields.values()):
+            dataset.resize(points, axis=0)
+        self._root["Offsets"].resize(offsets, axis=0)
+        self._root["NumberOfPoints"].resize(steps, axis=0)
+        self._root["FieldData/barrier_displacement"].resize(steps, axis=0)
+        self._steps.visititems(lambda _, item: item.resize(steps, axis=0) if isinstance(item, h5py.Dataset) else None)
 
     def _set_constants(self) -> None:
         """Numbers that are the same for every snapshot, over the whole room."""
@@ -113,12 +111,7 @@ class SnapshotRecorder:
     def mark(self) -> dict[str, int]:
         """Bring everything to the disk and tell where the file stands."""
         assert self._file is not None
-        self._file.flush()
-        descriptor = os.open(self._path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        bring_to_the_disk(self._file, self._path)
         return {"records": self.schedule.count, "snapshots": self._count, "points": self._points}
 
     def record(self, simulation: Any) -> None:
@@ -139,24 +132,24 @@ class SnapshotRecorder:
         assert self._file is not None
         filled = self._filled
         number, begin, step = len(position), self._points, self._count
-        _fill(filled["Points"], begin, self._as_vtk("position", position))
+        fill(filled["Points"], begin, self._as_vtk("position", position))
         for name, dataset in self._fields.items():
-            _fill(dataset, begin, self._as_vtk(name, np.asarray(points[name])))
+            fill(dataset, begin, self._as_vtk(name, np.asarray(points[name])))
 
         # Readers look for a step's offsets after those of the steps before, each one longer than its cells.
-        _fill(filled["Offsets"], begin + step, np.arange(number + 1))
-        _fill(filled["NumberOfPoints"], step, np.array([number]))
-        _fill(filled["Steps/PointOffsets"], step, np.array([begin]))
-        _fill(filled["Steps/CellOffsets"], step, np.array([[begin]]))
+        fill(filled["Offsets"], begin + step, np.arange(number + 1))
+        fill(filled["NumberOfPoints"], step, np.array([number]))
+        fill(filled["Steps/PointOffsets"], step, np.array([begin]))
+        fill(filled["Steps/CellOffsets"], step, np.array([[begin]]))
         displacement = getattr(simulation, "barrier_displacement", None)
         shift = np.nan if displacement is None else displacement
-        _fill(filled["FieldData/barrier_displacement"], step, np.array([shift]))
+        fill(filled["FieldData/barrier_displacement"], step, np.array([shift]))
         # The count goes last: until it is written, a reader does not look at the new snapshot. VTK wants as many times
         # as steps, so their data set alone grows, inside the room that is set aside for it.
         self._count, self._points = step + 1, begin + number
         times = filled["Steps/Values"]
         times.id.set_extent((self._count,))
-        _fill(times, step, np.array([simulation.time]))
+        fill(times, step, np.array([simulation.time]))
         h5py.h5a.open(self._steps.id, b"NSteps").write(np.array(self._count))
         self._file.flush()
 
@@ -176,21 +169,11 @@ class SnapshotRecorder:
             return
         with failures_of_the_disk():
             try:
-                self._give_back()
+                if self._count > 0:
+                    self._resize(self._points, self._points + self._count, self._count)
             finally:
                 file, self._file = self._file, None
                 file.close()
-
-    def _give_back(self) -> None:
-        if self._count > 0:
-            for dataset in (self._root["Points"], self._root["Types"], *self._fields.values()):
-                dataset.resize(self._points, axis=0)
-            self._root["Offsets"].resize(self._points + self._count, axis=0)
-            self._root["NumberOfPoints"].resize(self._count, axis=0)
-            self._root["FieldData/barrier_displacement"].resize(self._count, axis=0)
-            self._steps.visititems(
-                lambda _, item: item.resize(self._count, axis=0) if isinstance(item, h5py.Dataset) else None
-            )
 
     def _lay_out(self, number: int, fields: dict[str, np.ndarray]) -> None:
         """Create every group, attribute and data set; `number` is the most points that any snapshot will have."""
@@ -200,90 +183,50 @@ class SnapshotRecorder:
         root, room, number = self._root, self._room, max(number, 1)
         root.attrs["Version"] = np.array([2, 2])
         root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-        self._dataset(root, "Points", room * number, 3, np.float32, chunk=number)
+        set_aside(root, "Points", (room * number, 3), np.float32, chunk=number, blank=False)
         # As many cells as points, and all fields of a step begin at the same point: one data set under several names.
-        self._dataset(root, "NumberOfPoints", room, None, np.int64)
+        set_aside(root, "NumberOfPoints", (room,), np.int64)
         for name in ("NumberOfCells", "NumberOfConnectivityIds"):
             root[name] = root["NumberOfPoints"]
         # Cell i is the vertex i in every step: the list of vertices is shared, the types are all the fill value.
         root.create_dataset("Connectivity", data=np.arange(number))
-        self._dataset(root, "Offsets", room * (number + 1), None, np.int64, chunk=number + 1)
+        set_aside(root, "Offsets", (room * (number + 1),), np.int64, chunk=number + 1, blank=False)
         root.create_dataset(
             "Types", (room * number,), np.uint8, maxshape=(None,), chunks=(number,), fillvalue=VTK_VERTEX
         )
 
         self._steps = steps = root.create_group("Steps")
         steps.attrs["NSteps"] = 0
-        self._dataset(steps, "Values", 1, None, np.float64, chunk=room)
+        set_aside(steps, "Values", (1,), chunk=room, blank=False)
         steps["Values"].attrs["unit"] = "s"
-        self._dataset(steps, "PartOffsets", room, None, np.int64)
-        self._dataset(steps, "NumberOfParts", room, None, np.int64)
-        self._dataset(steps, "PointOffsets", room, None, np.int64)
-        self._dataset(steps, "CellOffsets", room, 1, np.int64)
-        self._dataset(steps, "ConnectivityIdOffsets", room, 1, np.int64)
+        set_aside(steps, "PartOffsets", (room,), np.int64)
+        set_aside(steps, "NumberOfParts", (room,), np.int64)
+        set_aside(steps, "PointOffsets", (room,), np.int64)
+        set_aside(steps, "CellOffsets", (room, 1), np.int64)
+        set_aside(steps, "ConnectivityIdOffsets", (room, 1), np.int64)
 
         point_data, point_offsets = root.create_group("PointData"), steps.create_group("PointDataOffsets")
         for name, values in fields.items():
             quantity = POINT_FIELDS[name]
             _, *components = _vtk_shape(values)
-            columns = components[0] if components else None
-            dataset = self._dataset(point_data, name, room * number, columns, np.float32, chunk=number)
+            shape = (room * number, *components)
+            dataset = set_aside(point_data, name, shape, np.float32, chunk=number, blank=False)
             dataset.attrs["unit"], dataset.attrs["meaning"] = quantity.unit, quantity.meaning
             self._fields[name] = dataset
             point_offsets[name] = steps["PointOffsets"]
 
         field_data, field_offsets = root.create_group("FieldData"), steps.create_group("FieldDataOffsets")
-        self._dataset(field_data, "barrier_displacement", room, None, np.float64)
-        self._dataset(field_offsets, "barrier_displacement", room, None, np.int64)
+        set_aside(field_data, "barrier_displacement", (room,))
+        set_aside(field_offsets, "barrier_displacement", (room,), np.int64)
         sizes = steps.create_group("FieldDataSizes")
-        self._dataset(sizes, "barrier_displacement", room, 2, np.int64)
+        set_aside(sizes, "barrier_displacement", (room, 2), np.int64)
         self._set_constants()
         self._filled = {name: root[name] for name in FILLED}
         assert self._file is not None
         self._file.flush()
-
-    def _dataset(
-        self,
-        group: h5py.Group,
-        name: str,
-        rows: int,
-        columns: int | None,
-        kind: type,
-        chunk: int | None = None,
-    ) -> h5py.Dataset:
-        """A data set whose room is set aside at once, so that filling it changes nothing in the file's structure."""
-        creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-        creation.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-        if chunk is not None:
-            creation.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-        trailing = () if columns is None else (columns,)
-        creation.set_chunk((chunk or rows, *trailing))
-        space = h5py.h5s.create_simple((rows, *trailing), (h5py.h5s.UNLIMITED, *trailing))
-        identifier = h5py.h5d.create(
-            group.id, name.encode(), h5py.h5t.py_create(np.dtype(kind), logical=True), space, dcpl=creation
-        )
-        return h5py.Dataset(identifier)
-
-
-@contextlib.contextmanager
-def failures_of_the_disk() -> Iterator[None]:
-    """HDF5 reports them as errors of any kind, with its whole life in the message."""
-    try:
-        yield
-    except (OSError, RuntimeError, ValueError) as error:
-        text = str(error)
-        reason = text.partition("error message = '")[2].partition("'")[0]
-        raise OSError(reason or text.partition("\n")[0]) from None
 
 
 def _vtk_shape(values: np.ndarray) -> tuple[int, ...]:
     """Shape with VTK's components: vectors of three, symmetric tensors of six (xx, yy, zz, xy, yz, xz)."""
     width = {2: 3, 4: 6}.get(values.shape[1] if values.ndim == 2 else 0)
     return values.shape if width is None else (len(values), width)
-
-
-def _fill(dataset: h5py.Dataset, begin: int, rows: np.ndarray) -> None:
-    """Write rows from `begin` on, by HDF5's own call: h5py's indexing takes longer than the writing."""
-    space = dataset.id.get_space()
-    space.select_hyperslab((begin, *(0 for _ in rows.shape[1:])), rows.shape)
-    dataset.id.write(h5py.h5s.create_simple(rows.shape), space, rows)

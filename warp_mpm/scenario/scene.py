@@ -53,7 +53,10 @@ class Scenario(Model):
         Raises:
             ScenarioError: the file cannot be read, is no JSON, or says something impossible; one sentence per problem.
         """
-        return cls.model_validate(with_tables_beside(read_json(Path(path)), Path(path).parent), source_name=str(path))
+        content = read_json(Path(path))
+        if isinstance(content, dict) and "vary" in content and "flow" not in content:
+            raise ScenarioError(["This is a sweep; python -m warp_mpm sweep runs it."], str(path))
+        return cls.model_validate(with_tables_beside(content, Path(path).parent), source_name=str(path))
 
     @model_validator(mode="before")
     @classmethod

@@ -151,6 +151,8 @@ class Sweep(_Model):
             content = read_json(Path(path))
         except ScenarioError as error:
             raise SweepError(str(error)) from None
+        if isinstance(content, dict) and "flow" in content and "vary" not in content:
+            raise SweepError(f"{path}: This is a scenario; a sweep is a file that names one and what varies in it.")
         return cls.checked(content, str(path))
 
     @classmethod
