@@ -103,12 +103,17 @@ def flattened(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, A
 
 
 def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What was there, what came and went, and what is not accounted for."""
-    rows = []
+    """The rows of `ledger_values` in words and units."""
+    return [(words, one.text(value).removesuffix(" -")) for words, value, one in ledger_values(series, summary)]
+
+
+def ledger_values(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tuple[str, float, Quantity]]:
+    """What was there, what came and went, and what is not accounted for: words, value in SI units, what it is."""
+    rows: list[tuple[str, float, Quantity]] = []
 
     def row(label: str, value: float | None, quantity: Quantity) -> None:
         if value is not None:
-            rows.append((label, quantity.text(value).removesuffix(" -")))
+            rows.append((label, value, quantity))
 
     def column(name: str, when: str = "", label: str = "") -> None:
         quantity = NAMED[name]
