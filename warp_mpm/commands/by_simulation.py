@@ -42,7 +42,14 @@ def begun(command: str, scenario_file: Path, out: Path | None, scenario: Scenari
 
     folder = out if out is not None else Path("runs") / f"{command}_{scenario_file.stem}"
     claim(folder, command)
-    for sentence in (*follows, *(f"Note: {one}" for one in scene_caveats(scenario))):
+    notes = scene_caveats(scenario)
+    if scenario.barriers:
+        further = ", ".join(one.name for one in scenario.barriers)
+        notes = [
+            *notes,
+            f"limits and figures are those of `barrier` alone; nothing is asked of the others ({further}).",
+        ]
+    for sentence in (*follows, *(f"Note: {one}" for one in notes)):
         say(sentence)
     return folder
 

@@ -133,12 +133,14 @@ def _verdict(names: Sequence[str], verdicts: Sequence[Mapping[str, Any] | None])
         if verdict is None:
             continue
         rows.append([run, "verdict", "", None, None, "", None, _answer(verdict["holds"]), ""])
-        for entry in verdict["checks"]:
+        of = [("", verdict["checks"]), *((f"{one['name']}: ", one["checks"]) for one in verdict.get("barriers", ()))]
+        for barrier, entry in ((barrier, entry) for barrier, checks in of for entry in checks):
             check = CHECKS[entry["name"]]
             scaled = [None if one is None else one * check.factor for one in (entry["value"], entry["limit"])]
             side = "" if entry["limit"] is None else "at least" if check.least else "at most"
             answer = "" if entry["limit"] is None else _answer(entry["holds"])
-            rows.append([run, check.words, check.shown_unit, *scaled, side, entry["time"], answer, check.formula])
+            words = f"{barrier}{check.words}"
+            rows.append([run, words, check.shown_unit, *scaled, side, entry["time"], answer, check.formula])
         for table, part in ((TOLD, "told"), (GUIDELINES, "guidelines")):
             for entry in verdict[part]:
                 told = table[entry["name"]]
