@@ -1,4 +1,4 @@
-"""`python -m fmu`."""
+"""`python -m fmu`, and the installed command `warp-mpm-fmu`."""
 
 import sys
 

@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 a check failed, 2 the input cannot be used (one sentence s
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -33,8 +34,8 @@ add_version(app)
 
 
 def main() -> None:
-    """Entry point of `python -m fmu`."""
-    app(prog_name="python -m fmu")
+    """Entry point of `python -m fmu` and of the installed command `warp-mpm-fmu`."""
+    app(prog_name="warp-mpm-fmu" if Path(sys.argv[0]).name.startswith("warp-mpm") else "python -m fmu")
 
 
 @app.command(epilog="Example: python -m fmu build --only BarrierSliding --only BarrierSlidingC --out fmus")

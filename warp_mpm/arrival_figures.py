@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mpm.discretization import fill_polygon
 from warp_mpm.geometry import area
-from warp_mpm.scenario import Scenario
+from warp_mpm.scenario import Scenario, Trapezoid
 
 Array = NDArray[np.float64]
 
@@ -40,12 +41,33 @@ def departed_volume(scenario: Scenario, figures: Mapping[str, Any]) -> float | N
     return left if abs(left) > max(1e-6 * flow.volume, scenario.numerics.spacing_m**2) else 0.0
 
 
+def lain_beyond(scenario: Scenario, place: float) -> float:
+    """Volume [m³/m] of the deposits that lay beyond a place x [m] at the start, by the points that they are made of."""
+    numerics, volume = scenario.numerics, 0.0
+    for deposit in scenario.flow.deposits:
+        outline = deposit.shape.polygon
+        if outline[:, 0].max() > place:
+            position, parts = fill_polygon(outline, numerics.spacing_m, numerics.points_per_cell)
+            volume += float(parts @ (position[:, 0] > place))
+    return volume
+
+
+def came_beyond(scenario: Scenario, volume: float, place: float) -> float:
+    """What came beyond a place x [m] of a volume [m³/m] that is beyond it in the end: that less what lay there."""
+    lain = lain_beyond(scenario, place)
+    came = volume - lain
+    return came if lain == 0.0 or came > 1e-6 * lain else 0.0  # points have single precision
+
+
 def arrival_figures(scenario: Scenario, series: Mapping[str, Array], figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Volumes of what has arrived, of what lay there and of what has left; nothing where neither is."""
+    """Volumes of what arrived, lay there, left and overtopped; nothing where nothing arrives and nothing lies there."""
     flow = scenario.flow
     found: dict[str, Any] = {}
     if flow.deposits:
         found["deposited_volume"] = flow.deposited_volume
+        beyond, barrier = figures.get("overtopped_volume"), scenario.barrier
+        if beyond is not None and barrier is not None and isinstance(barrier.shape, Trapezoid):
+            found["overtopped_volume"] = came_beyond(scenario, beyond, barrier.shape.crest_end)
     if flow.inflow is not None:
         arrived = "inflow_mass" in series
         found["inflow_volume"] = float(series["inflow_mass"][-1]) / flow.material.density if arrived else None

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.force_record import cumulative_impulse, filtered_peak, moving_mean
+from warp_mpm.arrival_figures import came_beyond
 from warp_mpm.results import Snapshots
 from warp_mpm.scenario import Scenario, Wall
 from warp_mpm.scenario.site import all_standing
@@ -28,10 +29,11 @@ def barrier_figures(
     other.
 
     Each row: `name`, `x` of the toe [m]; of the horizontal force on the whole barrier `peak_force` and
-    `peak_force_filtered` [N/m] with their times [s], and `impulse` [N s/m]; `displacement` [m], `velocity` [m/s] and
-    `work` [J/m] at the end, 0 of a fixed one; `held_volume` and `passed_volume` [m³/m] at the end, between the crest of
-    the barrier before and its own, and beyond its own; `landing_distance` [m], from its heel to where the first of what
-    passes it is on the ground; and `first_force_time` [s]. What is not known is None.
+    `peak_force_filtered` [N/m] with their times [s], and `impulse` [N s/m]; `face_impulse` [N s/m] on its face alone,
+    as the run's `impulse` is; `displacement` [m], `velocity` [m/s] and `work` [J/m] at the end, 0 of a fixed one;
+    `held_volume` [m³/m] at the end between the crest of the barrier before and its own; `passed_volume` [m³/m], what is
+    beyond its own then and did not lie there at the start; `landing_distance` [m], from its heel to where the first of
+    what passes it is on the ground; and `first_force_time` [s]. What is not known is None.
 
     Args:
         scenario: what was run.
@@ -43,16 +45,19 @@ def barrier_figures(
     rows = []
     beyond = _volumes_beyond(scenario, series, snapshots)
     before = beyond.pop("inside", None)
-    for name, x, _, standing in all_standing(scenario):
+    for name, x, barrier, standing in all_standing(scenario):
         row: dict[str, Any] = {"name": name, "x": x} | _force_figures(series, _force_on(series, name))
+        row["face_impulse"] = _impulse(series, "impact_force_x" if name == "barrier" else f"{name}_face_force_x")
         moving = {"displacement": "barrier_displacement", "velocity": "barrier_velocity", "work": "barrier_work"}
         for figure, column in moving.items():
             values = series.get(column if name == "barrier" else f"{name}_{column}")
             fixed = name != "barrier" and _kind(scenario, name) == "fixed"
             row[figure] = 0.0 if fixed else None if values is None else float(values[-1])
-        passed = beyond.get(name)
-        row["held_volume"] = None if passed is None or before is None else before - passed
-        row["passed_volume"] = before = passed
+        there = beyond.get(name)
+        row["held_volume"] = None if there is None or before is None else before - there
+        crest_end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.crest_end
+        row["passed_volume"] = None if there is None else came_beyond(scenario, there, crest_end)
+        before = there
         row["landing_distance"] = _landing(scenario, name, standing, series, snapshots)
         rows.append(row)
     return {"barriers": rows}
@@ -91,6 +96,13 @@ def _force_figures(series: Series, force: Array | None) -> dict[str, float | Non
     }
 
 
+def _impulse(series: Series, column: str) -> float | None:
+    """Time integral of a force [N s/m]."""
+    if column not in series or len(series["time"]) < 2:
+        return None
+    return float(cumulative_impulse(series["time"], series[column])[-1])
+
+
 def _volumes_beyond(
     scenario: Scenario, series: Series, snapshots: Sequence[Snapshot] | Snapshots | None
 ) -> dict[str, float]:
@@ -103,7 +115,7 @@ def _volumes_beyond(
     found = {"inside": float(volume.sum())}
     for name, x, barrier in scenario.all_barriers:
         moved = _moved(name, series, snapshot)
-        end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.polygon[2, 0]
+        end = x if isinstance(barrier.shape, Wall) else x + barrier.shape.crest_end
         found[name] = float(volume @ (snapshot.position[:, 0] > end + moved))
     return found
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from warp_mpm.extent import domain_caveats
-from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial, Wall
+from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
 from warp_mpm.simulator.laws import LAWS
 from warp_mpm.slips import slips
 
@@ -45,7 +45,6 @@ def scene_caveats(scenario: Scenario) -> list[str]:
     found += [
         *_unlikely_friction(scenario),
         *_impossible_start(scenario),
-        *_deposits_behind(scenario),
         *_abrupt_inflow(scenario),
     ]
     uneven = scenario.ground is not None and scenario.ground.profile_m is not None
@@ -74,19 +73,6 @@ def _abrupt_inflow(scenario: Scenario) -> list[str]:
         f"flow.inflow: the velocity changes so fast at t = {inflow.times[first]:g} s that what approaches the section "
         f"would stretch by {asked[first]:.3g} of its length a second; {most[first]:.3g} is the most that is followed, "
         "and the flow makes up for the rest once it is let go."
-    ]
-
-
-def _deposits_behind(scenario: Scenario) -> list[str]:
-    """Deposits beyond the barrier's crest, which volumes take for what went over it."""
-    if scenario.barrier is None or isinstance(scenario.barrier.shape, Wall):
-        return []
-    crest = float(scenario.barrier.shape.polygon[2, 0])
-    return [
-        f"flow.deposits[{place}] reaches beyond the barrier's crest: overtopped_volume, and a limit of it, count what "
-        "lies there too."
-        for place, deposit in enumerate(scenario.flow.deposits)
-        if deposit.shape.polygon[:, 0].max() > crest + 1e-9
     ]
 
 

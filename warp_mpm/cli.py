@@ -8,8 +8,9 @@ from __future__ import annotations
 import json
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -19,6 +20,7 @@ from warp_mpm.commands.check import check
 from warp_mpm.commands.options import ScenarioCommandLine, with_options
 
 if TYPE_CHECKING:
+    from warp_mpm.live import LivePage
     from warp_mpm.scenario import Scenario
 
 DIVERGED, INTERRUPTED = 3, 130
@@ -90,6 +92,12 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Go on with the interrupted run in this folder.", show_default=False),
     ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the run in a browser of this machine while it goes on.")
+    ] = False,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of the page of --live.", show_default="a free one")
+    ] = None,
     pictures: Annotated[
         bool, typer.Option(help="Draw two figures at the end; they take longer than a coarse run.")
     ] = True,
@@ -104,7 +112,8 @@ def run(
     figures (PNG), the resolved scenario (scenario.json) and the record of the run (run.json).
 
     Ctrl-C ends the run cleanly and keeps all that was computed. A run that was interrupted, by whatever, goes on with
-    --resume DIR, and on the CPU gives the same numbers as one that was not.
+    --resume DIR, and on the CPU gives the same numbers as one that was not. With --live a page of 127.0.0.1 shows flow,
+    forces and time left as they come, and stops the run or keeps what is there; looking changes no number.
 
     Exit codes: 0 done, 2 the input cannot be used, 3 the simulation diverged, 130 interrupted.
     """
@@ -112,9 +121,13 @@ def run(
         _refuse("--accuracy and --budget choose the spacing; of them and --spacing only one is allowed.")
     if (accuracy, budget) != (None, None) and (resume is not None or len(scenario_files or []) > 1):
         _refuse("--accuracy and --budget are for one new run, not for --resume nor for several scenarios.")
+    if port is not None and not live:
+        _refuse("--port is that of the page of --live, which is not asked for.")
     if scenario_files and len(scenario_files) > 1:
         if resume is not None:
             _refuse("--resume DIR goes on with one run; it takes no scenario files.")
+        if live:
+            _refuse("--live shows one run; it does not go with several scenarios.")
         from warp_mpm.commands.several import run_several
 
         options = _options(device, spacing, until, report, force, pictures)
@@ -162,28 +175,19 @@ def run(
             _refuse(str(error))
         return simulation
 
+    page = _live_page(scenario, folder, port) if live and not ended_before else None
     try:
-        with signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display:
-            stopped = lambda: signal.received  # noqa: E731
+        with signal, RunDisplay(scenario, device=device, quiet=quiet or as_json) as display, page or nullcontext():
+            watching: dict[str, Any] = {"on_progress": display.show, "stop": lambda: signal.received}
+            if page is not None:
+                watching = page.watching(display.show, lambda: signal.received)
+            how: dict[str, Any] = {"make_simulation": make_simulation, "pictures": pictures} | watching
             if resume is not None:
-                outcome = resume_run(
-                    folder,
-                    make_simulation=make_simulation,
-                    on_progress=display.show,
-                    stop=stopped,
-                    pictures=pictures,
-                )
+                outcome = resume_run(folder, **how)
             else:
-                outcome = run_scenario(
-                    scenario,
-                    folder,
-                    make_simulation=make_simulation,
-                    force=force,
-                    origin=str(scenario_file),
-                    on_progress=display.show,
-                    stop=stopped,
-                    pictures=pictures,
-                )
+                outcome = run_scenario(scenario, folder, force=force, origin=str(scenario_file), **how)
+            if page is not None:
+                page.end(outcome.finished)
     except (RunFolderError, ResultsError) as error:
         _refuse(str(error))
     except SimulationDiverged as error:
@@ -264,6 +268,18 @@ def _scenario(file: Path, spacing: float | None, until: float | None) -> Scenari
         return with_options(Scenario.load(file), spacing=spacing, until=until)
     except ScenarioError as error:
         _refuse(str(error))
+
+
+def _live_page(scenario: Scenario, folder: Path, port: int | None) -> LivePage:
+    """The page of the run, its address told."""
+    from warp_mpm.live import LivePage
+
+    try:
+        page = LivePage(scenario, folder, port=port or 0)
+    except ValueError as error:
+        _refuse(str(error))
+    typer.echo(f"The run can be watched at {page.address}", err=True)
+    return page
 
 
 def _run_in(folder: Path) -> tuple[Scenario, bool]:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from analytic.empirical import reflected_depth_ratio
 from analytic.force_record import RESIDUAL_SHARE, moving_mean
 from warp_mpm import geometry
-from warp_mpm.arrival_figures import departed_volume
+from warp_mpm.arrival_figures import came_beyond, departed_volume
 from warp_mpm.quantities import Quantity
-from warp_mpm.scenario import Design, OutlineShape, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario import Design, Fixed, FurtherBarrier, OutlineShape, Scenario, Sliding, Trapezoid
 from warp_mpm.scenario.site import standing_outline
 
 Array = NDArray[np.float64]
@@ -134,8 +134,8 @@ def verdict(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> d
 
     Returns:
         `holds` (None where nothing could be judged), `checks` (name, value, time, limit, holds, formula; all but the
-        names and formulas None where they are not known), `told` and `guidelines` (name, value, formula) and
-        `remarks`, sentences.
+        names and formulas None where they are not known), `told` and `guidelines` (name, value, formula), `remarks`,
+        sentences, and of a scene with further barriers `barriers` (name, checks), which `holds` counts too.
     """
     design = scenario.design
     if design is None or scenario.barrier is None:
@@ -169,13 +169,65 @@ def verdict(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> d
         if check["name"] == "displacement" and check["holds"] and figures.get("barrier_at_rest") is False:
             check["holds"] = None
             answers.append(None)
+    further = [_further(scenario, design, one, series, limits) for one in scenario.barriers]
+    answers += [check["holds"] for one in further for check in one["checks"] if check["limit"] is not None]
+    if further:
+        remarks.append(FURTHER)
     return {
         "holds": False if False in answers else None if None in answers or not answers else True,
         "checks": checks,
         "told": [_said(TOLD[name], value) for name, value in _told(scenario, series, figures).items()],
         "guidelines": [_said(GUIDELINES[name], _guideline(scenario, name)) for name in design.guidelines],
         "remarks": remarks,
+        **({"barriers": further} if further else {}),
     }
+
+
+FURTHER = (
+    "Of the further barriers sliding and displacement alone are judged, with the same limits: their moments, run-up "
+    "and what went over each are not."
+)
+
+
+def _further(
+    scenario: Scenario, design: Design, one: FurtherBarrier, series: Series, limits: Mapping[str, float | None]
+) -> dict[str, Any]:
+    """Name and checks of one of the further barriers."""
+    moves = not isinstance(one.motion, Fixed)
+    values: dict[str, tuple[float | None, float | None]] = {}
+    displacement = series.get(f"{one.name}_barrier_displacement")
+    if not moves or displacement is not None:
+        values["displacement"] = (float(displacement[-1]) if moves and displacement is not None else 0.0, None)
+    friction = one.motion.base_friction_coefficient if isinstance(one.motion, Sliding) else design.base_friction
+    mass = one.mass
+    if mass is None and design.density_kg_per_m3 is not None and isinstance(one.shape, Trapezoid):
+        mass = design.density_kg_per_m3 * geometry.area(one.shape.outline)
+    recorded = all(f"{one.name}_force_{axis}" in series for axis in "xy") and len(series["time"]) > 1
+    if friction is not None and mass is not None and recorded:
+        values["sliding_factor"] = _sliding_factor(scenario, design, series, f"{one.name}_force", (mass, friction))
+    checks = [_judged(CHECKS[name], *value, limits[name]) for name, value in values.items()]
+    velocity = series.get(f"{one.name}_barrier_velocity")
+    for check in checks:
+        if check["name"] == "displacement" and check["holds"] and velocity is not None and velocity[-1] != 0.0:
+            check["holds"] = None
+    return {"name": one.name, "checks": checks}
+
+
+def _sliding_factor(
+    scenario: Scenario, design: Design, series: Series, force: str, block: tuple[float, float], push: float = 0.0
+) -> tuple[float | None, float | None]:
+    """Least factor of safety against sliding under a recorded force, and its time [s].
+
+    Args:
+        force: name of its columns, without the axis.
+        block: mass [kg/m] and friction coefficient of the base.
+        push: further load along x [N/m].
+    """
+    time, tilt, (mass, friction) = series["time"], math.radians(scenario.gravity.tilt_deg), block
+    weight = mass * scenario.gravity.acceleration_m_per_s2
+    across, lift = (design.load_factor * moving_mean(time, series[f"{force}_{axis}"]) for axis in "xy")
+    resistance = friction / design.base_friction_factor * np.maximum(weight * math.cos(tilt) - lift, 0.0)
+    return _least(time, resistance, across + weight * math.sin(tilt) + push)
 
 
 def _judged(check: Check, value: float | None, time: float | None, limit: float | None) -> dict[str, Any]:
@@ -294,14 +346,9 @@ def _sliding_of_wall(
         remarks.append(f"The barrier's stability is not known without {', '.join(missing) or 'samples'}.")
         return {}
     assert barrier.mass is not None
-    time, tilt = series["time"], math.radians(scenario.gravity.tilt_deg)
-    weight = barrier.mass * scenario.gravity.acceleration_m_per_s2
-    push, lift = (design.load_factor * moving_mean(time, series[f"impact_force_{axis}"]) for axis in "xy")
-    across = push + weight * math.sin(tilt)
-    if design.boulder is not None:
-        across = across + _boulder_push(scenario, design)[0]
-    friction = barrier.motion.base_friction_coefficient / design.base_friction_factor
-    return {"sliding_factor": _least(time, friction * np.maximum(weight * math.cos(tilt) - lift, 0.0), across)}
+    block = (barrier.mass, barrier.motion.base_friction_coefficient)
+    boulder = 0.0 if design.boulder is None else _boulder_push(scenario, design)[0]
+    return {"sliding_factor": _sliding_factor(scenario, design, series, "impact_force", block, boulder)}
 
 
 def _least(time: Array, withstands: Array, load: Array) -> tuple[float | None, float | None]:
@@ -347,7 +394,8 @@ def _overtopping(scenario: Scenario, figures: Mapping[str, Any]) -> dict[str, tu
         return {"overtopped_share": (0.0, None), "overtopped_volume": (0.0, None), "freeboard": (None, None)}
     beyond, left = figures.get("overtopped_volume"), departed_volume(scenario, figures)
     if beyond is not None:
-        volume = float(beyond) + max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
+        volume = came_beyond(scenario, float(beyond), scenario.barrier.shape.crest_end)
+        volume += max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
         found["overtopped_share"] = (volume / scenario.flow.volume, None)
         found["overtopped_volume"] = (volume, None)
     if figures.get("run_up_max") is not None:
@@ -407,19 +455,25 @@ def verdict_rows(verdict: Mapping[str, Any]) -> list[tuple[str, str]]:
     limited = any(check["limit"] is not None for check in verdict["checks"])
     unknown = "not known: see the remarks" if limited else "not judged: the design group has no limits"
     rows = [("verdict", {True: "holds", False: "does NOT hold", None: unknown}[verdict["holds"]])]
-    for entry in verdict["checks"]:
-        check = CHECKS[entry["name"]]
-        value, limit = entry["value"], entry["limit"]
-        nothing = "no crest to reach" if check.name == "freeboard" else "no load" if check.least else "without end"
-        text = nothing if value is None else check.text(value).removesuffix(" -")
-        text += f" at {entry['time']:.3f} s" if entry["time"] is not None else ""
-        if limit is not None:
-            bound = check.text(limit).removesuffix(" -")
-            answer = {True: "holds", False: "FAILS", None: "not known yet"}[entry["holds"]]
-            text += f"; {'at least' if check.least else 'at most'} {bound}: {answer}"
-        rows.append((f"  {check.words}", text))
+    rows += [(f"  {CHECKS[entry['name']].words}", _answer_row(entry)) for entry in verdict["checks"]]
+    for one in verdict.get("barriers", ()):
+        rows += [(f"  {one['name']}: {CHECKS[entry['name']].words}", _answer_row(entry)) for entry in one["checks"]]
     for table, part in ((TOLD, "told"), (GUIDELINES, "guidelines")):
         rows += [
             (f"  {table[entry['name']].words}", table[entry["name"]].text(entry["value"])) for entry in verdict[part]
         ]
     return [*rows, *(("  remark", sentence) for sentence in verdict["remarks"])]
+
+
+def _answer_row(entry: Mapping[str, Any]) -> str:
+    """Value, limit and judgement of a check."""
+    check = CHECKS[entry["name"]]
+    value, limit = entry["value"], entry["limit"]
+    nothing = "no crest to reach" if check.name == "freeboard" else "no load" if check.least else "without end"
+    text = nothing if value is None else check.text(value).removesuffix(" -")
+    text += f" at {entry['time']:.3f} s" if entry["time"] is not None else ""
+    if limit is not None:
+        bound = check.text(limit).removesuffix(" -")
+        answer = {True: "holds", False: "FAILS", None: "not known yet"}[entry["holds"]]
+        text += f"; {'at least' if check.least else 'at most'} {bound}: {answer}"
+    return text

@@ -16,9 +16,11 @@ def install(extra: str) -> str:
     try:
         required = metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:  # a bare checkout
-        return f"pip install '.[{extra}]' in the project's folder"
+        required = []
     marker = re.compile(rf"""\s*;\s*extra\s*==\s*["']{extra}["']$""")
     packages = [marker.sub("", line) for line in required if marker.search(line)]
+    if not packages:  # a checkout that was installed before it had this extra
+        return f"pip install '.[{extra}]' in the project's folder"
     return "pip install " + " ".join(f'"{package}"' for package in packages)
 
 

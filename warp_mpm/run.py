@@ -156,6 +156,7 @@ def run_scenario(
     recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    keep: Callable[[], bool] = lambda: False,
     pictures: bool = True,
 ) -> RunOutcome:
     """Simulate a scenario and record it in a run folder.
@@ -172,6 +173,7 @@ def run_scenario(
             the end of the run, however it ends.
         on_progress: called after each record.
         stop: asked between records; true ends the run cleanly before its time.
+        keep: asked between records; true writes a checkpoint, beside those that are due anyway.
         pictures: draw the run's two figures at the end, which takes longer than a coarse run does.
 
     Raises:
@@ -185,7 +187,7 @@ def run_scenario(
     simulation.prepare()
     record = _record(scenario, simulation, origin) | {"preparation_time": time.perf_counter() - preparing}
     with RunFolder.create(out, scenario.resolved(), record, force=force) as folder:
-        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, pictures)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, keep, pictures)
 
 
 def resume_run(
@@ -195,6 +197,7 @@ def resume_run(
     recorders: Sequence[Recorder] = (),
     on_progress: Callable[[RunProgress], None] | None = None,
     stop: Callable[[], bool] = lambda: False,
+    keep: Callable[[], bool] = lambda: False,
     pictures: bool = True,
 ) -> RunOutcome:
     """Go on with an interrupted run from its last checkpoint; on the CPU its records are then, bit for bit, those of a
@@ -206,6 +209,7 @@ def resume_run(
         recorders: as in `run_scenario`; they record where the run goes on, and from then on at their times.
         on_progress: as in `run_scenario`.
         stop: as in `run_scenario`.
+        keep: as in `run_scenario`.
         pictures: as in `run_scenario`.
 
     Raises:
@@ -247,7 +251,7 @@ def resume_run(
             "preparation_time": preparation_time,
         }
         record |= {"status": "running", "problem": None, "resumed": [*record.get("resumed", []), resumed]}
-        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, pictures, checkpoint)
+        return _go_on(folder, scenario, simulation, record, recorders, on_progress, stop, keep, pictures, checkpoint)
 
 
 def _go_on(
@@ -258,6 +262,7 @@ def _go_on(
     own: Sequence[Recorder],
     on_progress: Callable[[RunProgress], None] | None,
     stop: Callable[[], bool],
+    keep: Callable[[], bool],
     pictures: bool,
     checkpoint: Checkpoint | None = None,
 ) -> RunOutcome:
@@ -294,6 +299,7 @@ def _go_on(
         {"time_series": series, **structured},
         output.checkpoint_interval_s,
         wall_before=wall_before,
+        asked=keep,
     )
 
     status, problem = "failed", None

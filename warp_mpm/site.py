@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,6 +142,38 @@ class Decided:
     """given, assumed, or how it was computed."""
 
 
+FOLLOWS = ("computed", "its mass over its section")
+"""Origins of what the scenario itself tells at any time, which no note says, lest the one change without the other."""
+
+NOTED = {
+    "numerics.spacing_m": "spacing",
+    "output.end_time_s": "until",
+    "flow.shape.depth_m": "depth",
+    "flow.shape.distance_m": "distance",
+    "flow.velocity_m_per_s.0": "speed",
+    "gravity.tilt_deg": "slope",
+    "flow.material.porosity": "porosity",
+    "flow.material.grain_density_kg_per_m3": "grain_density",
+    "flow.material.liquid_density_kg_per_m3": "liquid_density",
+    "flow.material.friction_angle_deg": "friction_angle",
+    "flow.material.hydraulic_conductivity_m_per_s": "conductivity",
+    "ground.friction": "ground_friction",
+    "barrier.shape.height_m": "height",
+    "barrier.shape.crest_width_m": "crest",
+    "barrier.shape.face_angle_deg": "face_angle",
+    "barrier.motion.density_kg_per_m3": "barrier_density",
+    "barrier.motion.base_friction": "base_friction",
+    "barrier.friction": "face_friction",
+}
+"""Fields of a scenario and the questions that ask for them."""
+
+
+def notes_still_true(notes: Sequence[str], changed: Collection[str]) -> list[str]:
+    """Notes of a scenario that was made here, without those on fields that were changed since."""
+    gone = tuple(f"{QUESTIONS[NOTED[path]].words}: " for path in changed if path in NOTED)
+    return [note for note in notes if not note.startswith(gone)]
+
+
 def missing(given: Mapping[str, Any]) -> list[str]:
     """One sentence for each thing that must be given and is not."""
     found = []
@@ -214,7 +246,9 @@ def new_scenario(
     head = {
         "title": title or f"{made}{where} against a {kind} barrier of {height:g} m",
         "source": "Made by warp-mpm init.",
-        "notes": [f"{one.words}: {one.value} ({one.origin})" for one in site.told if one.origin != "given"],
+        "notes": [
+            f"{one.words}: {one.value} ({one.origin})" for one in site.told if one.origin not in ("given", *FOLLOWS)
+        ],
     }
     return head | content, site.told
 

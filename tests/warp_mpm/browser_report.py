@@ -1,4 +1,5 @@
-"""The report in a real browser: no complaints on the console, the play button plays, the pointer finds values.
+"""Report and live page in a real browser: no complaints on the console, buttons do what they say, the pointer finds
+values.
 
 Not collected by default: `make test-browser` runs it. Needs Playwright and Chromium (Debian's package `chromium`, or
 its path in CHROMIUM).
@@ -6,9 +7,11 @@ its path in CHROMIUM).
 
 import os
 import shutil
+import threading
 
 import pytest
 
+from warp_mpm.live import LivePage
 from warp_mpm.report import write_report
 from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
@@ -103,3 +106,88 @@ def test_every_section_is_filled(page):
     for table in ("figure-table", "ledger-table", "settings-table", "versions-table"):
         assert page.locator(f"#{table} tr").count() > 3
     assert page.locator("#problem").is_hidden()
+
+
+# -- the live page -----------------------------------------------------------------------------------------------------
+
+
+def until(page, expression):
+    """Wait; `wait_for_function` would need what the page's policy forbids."""
+    for _ in range(200):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError(f"never: {expression}")
+
+
+@pytest.fixture(params=["light", "dark"])
+def live(browser, tmp_path, load_scene, flying_points, request):
+    """A run that goes on until it is let go or stopped, and a browser that looks at it."""
+    scene = load_scene("case_1", **{"numerics.spacing_m": 0.5, "output.end_time_s": 300.0})
+    scene = scene.replaced({"output.time_series_interval_s": 0.1, "output.checkpoint_interval_s": 1000.0})
+    outcomes = []
+    complaints = []
+    with LivePage(scene, tmp_path / "run") as server:
+
+        def run():
+            slowly = threading.Event()
+            watching = server.watching(lambda progress: slowly.wait(0.05), lambda: False)
+            outcomes.append(run_scenario(scene, tmp_path / "run", make_simulation=flying_points, **watching))
+            server.end(outcomes[0].finished)
+
+        page = browser.new_page(viewport={"width": 1200, "height": 900}, color_scheme=request.param)
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        runner = threading.Thread(target=run)
+        page.goto(server.address)
+        page.wait_for_selector("body[data-ready=yes]", timeout=20_000)
+        assert page.locator("#status").text_content().startswith("preparing")
+        runner.start()
+        until(page, "live.frame > 1 && live.samples.length > 5")
+        yield page, outcomes
+        server.ask("stop")
+        runner.join()
+    assert complaints == []
+    page.close()
+
+
+def test_the_live_page_shows_the_run_and_stops_it(live):
+    page, outcomes = live
+    before, samples = (
+        page.evaluate("document.getElementById('points').toDataURL()"),
+        page.evaluate("live.samples.length"),
+    )
+    until(page, f"live.frame > 3 && live.samples.length > {samples + 5}")
+    assert page.evaluate("document.getElementById('points').toDataURL()") != before
+    assert page.locator("#charts .chart path").count() == 3
+    assert page.locator("#left").text_content().endswith("min left")
+    page.select_option("#field", "speed")
+    assert "speed" in page.locator("#points").get_attribute("aria-label")
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+    page.keyboard.press("Tab")
+    page.focus("#keep")
+    page.keyboard.press("Enter")
+    until(page, "document.getElementById('said').textContent.startsWith('Kept at t =')")
+
+    page.focus("#stop")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Escape")  # changed one's mind
+    page.wait_for_timeout(700)
+    assert page.locator("#stop").is_enabled()
+    page.focus("#stop")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    until(page, "document.getElementById('status').textContent === 'stopped'")
+    assert [outcome.finished for outcome in outcomes] == [False]
+    assert page.locator("#stop").is_disabled()
+
+
+def test_the_live_page_fits_a_telephone(live):
+    page, _ = live
+    page.set_viewport_size({"width": 380, "height": 700})
+    page.wait_for_timeout(700)
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    for button in ("#keep", "#stop"):
+        assert page.locator(button).bounding_box()["height"] >= 24

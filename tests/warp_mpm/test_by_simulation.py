@@ -513,7 +513,9 @@ def test_the_commands_on_real_runs(tmp_path, load_scene, monkeypatch, fewer_samp
         table = list(csv.DictReader(file))
     assert {row["problem"] for row in table} == {""}
     assert float(table[0]["peak_force_filtered"]) > 0.0
-    assert Scenario.load(tmp_path / "search/barrier.json").barrier.shape.crest_width_m == 3.0
+    found = Scenario.load(tmp_path / "search/barrier.json")
+    assert found.barrier.shape.crest_width_m == 3.0
+    assert found.notes[-1].endswith(f"{CREST} = 3")
     assert (tmp_path / "search/answer.png").stat().st_size > 10_000
     again = call(*search, "--json")
     assert "0 runs made" in again.stderr

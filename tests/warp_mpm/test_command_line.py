@@ -1,7 +1,9 @@
 """What the three command lines share: help that keeps its units, and one sentence for a value that is not allowed."""
 
+import importlib
 import re
 import sys
+import tomllib
 import typing
 from pathlib import Path
 
@@ -146,3 +148,20 @@ def test_an_option_has_the_name_under_which_it_was_typed():
     given = words("design --density 1800 --flow-length 15 --flow-height 3 --speed 10 --base-friction 0.29 --limit 1")
     said = refusal(analytic.cli.app, *given, "--barrier-density", "-5")
     assert said == "density of the barrier is -5, it must be a number in (0, inf)."
+
+
+SCRIPTS = tomllib.loads((SCENES.parent / "pyproject.toml").read_text())["project"]["scripts"]
+
+
+@pytest.mark.parametrize(
+    ("script", "package"), [("warp-mpm", "warp_mpm"), ("warp-mpm-analytic", "analytic"), ("warp-mpm-fmu", "fmu")]
+)
+def test_each_command_line_is_an_installed_command_that_knows_its_name(script, package, monkeypatch, capsys):
+    """What an installer makes of `project.scripts`: a program of that name, which calls that function."""
+    module, _, function = SCRIPTS[script].partition(":")
+    for called, told in ((f"/usr/bin/{script}", script), (f"/somewhere/{package}/__main__.py", f"python -m {package}")):
+        monkeypatch.setattr(sys, "argv", [called, "--help"])
+        with pytest.raises(SystemExit) as end:
+            getattr(importlib.import_module(module), function)()
+        assert not end.value.code
+        assert re.search(rf"Usage: {re.escape(told)} \[OPTIONS\]", capsys.readouterr().out)

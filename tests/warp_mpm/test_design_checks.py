@@ -201,6 +201,32 @@ def test_a_wall_without_end_that_slides(load_scene):
     assert "only its sliding is judged" in rows["  remark"]
 
 
+def test_further_barriers_are_judged_by_sliding_and_displacement(load_scene):
+    """The second of two: by its own mass and friction, with the same limits; the whole holds where both do."""
+    scenario = load_scene(
+        "site_two_barriers", design={"displacement_m": 0.5, "load_factor": 1.5, "base_friction_factor": 1.25}
+    )
+    series = constant() | {
+        name: np.full(401, value)
+        for name, value in (("second_force_x", 40e3), ("second_force_y", -20e3), ("second_barrier_velocity", 0.0))
+    }
+    weight = 2000.0 * 10.5 * G
+    for slid, still, holds in ((0.4, True, True), (0.7, True, False), (0.4, False, None)):
+        series["second_barrier_displacement"] = np.linspace(0.0, slid, 401)
+        series["second_barrier_velocity"][-1] = 0.0 if still else 0.1
+        found = verdict(scenario, series, FIGURES)
+        (second,) = found["barriers"]
+        checks = {check["name"]: check for check in second["checks"]}
+        assert (second["name"], found["holds"]) == ("second", holds)
+        assert checks["displacement"] == checks["displacement"] | {"value": slid, "limit": 0.5, "holds": holds}
+        assert checks["sliding_factor"]["value"] == pytest.approx(0.4 / 1.25 * (weight + 30e3) / 60e3)
+        assert checks["sliding_factor"]["holds"] is None
+        assert any(remark.startswith("Of the further barriers sliding") for remark in found["remarks"])
+        told = {True: "holds", False: "FAILS", None: "not known yet"}[holds]
+        assert dict(verdict_rows(found))["  second: displacement"] == f"{slid} m; at most 0.5 m: {told}"
+    assert "barriers" not in verdict(block(load_scene), constant(), FIGURES)
+
+
 def test_a_boulder_is_superposed(load_scene):
     scenario = block(load_scene, boulder={"radius_m": 0.5, "speed_m_per_s": 8.0, "width_m": 6.0, "height_m": 2.0})
     checks, found = answers(scenario, constant())

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from warp_mpm import plotting
-from warp_mpm.caveats import scene_caveats
+from warp_mpm.arrival_figures import arrival_figures
+from warp_mpm.barrier_figures import barrier_figures
+from warp_mpm.design_checks import verdict
 from warp_mpm.discretization import material_points
 from warp_mpm.extent import domain_extent
 from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
+from warp_mpm.snapshot import Snapshot
 from warp_mpm.tables_beside import tables_beside
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -123,13 +126,40 @@ def test_bodies_have_the_stress_of_their_own_slope():
         np.testing.assert_allclose(total[chosen], (weight * depth / (1.0 + slope**2))[chosen], rtol=1e-9)
 
 
-def test_a_deposit_behind_the_barrier_is_told_of():
+def test_what_lay_behind_the_barrier_did_not_go_over_it():
+    """Of what is beyond the crest in the end, what the figures, the verdict and the table of barriers count."""
     trapezoid = {"kind": "trapezoid", "base_width_m": 4, "crest_width_m": 1, "height_m": 2}
     barrier = {"shape": trapezoid, "motion": {"kind": "fixed"}, "friction": 0.3}
-    for begin, told in ((-10, False), (6, True)):
-        deposit = {"shape": {"kind": "on_ground", "from_m": begin, "to_m": begin + 4, "depth_m": 1}}
-        notes = scene_caveats(scene(barrier=barrier, **{"flow.deposits": [deposit]}))
-        assert any("flow.deposits[0] reaches beyond the barrier's crest" in note for note in notes) == told
+    deposit = {"shape": {"kind": "on_ground", "from_m": 4, "to_m": 10, "depth_m": 1}}
+    behind = scene(barrier=barrier, barriers=[DAM | {"x_m": 14}], design={}, **{"flow.deposits": [deposit]})
+    points = material_points(behind)
+    x = points.position[:, 0]
+    lies = ~points.waits & (x > 2.5)
+    lain = float(points.volume @ lies)
+    assert lain == pytest.approx(6.0)
+
+    def counted(volume):
+        figures = {"overtopped_volume": volume, "left_volume": 0.0, "end_time": 100.0}
+        share = {check["name"]: check["value"] for check in verdict(behind, {"time": np.zeros(1)}, figures)["checks"]}
+        return arrival_figures(behind, {}, figures)["overtopped_volume"], share
+
+    there, share = counted(lain + 3.0)
+    assert there == pytest.approx(3.0)
+    left = share["overtopped_volume"] - there  # of the inflow, which is not in the figures above
+    assert share["overtopped_share"] == pytest.approx((there + left) / behind.flow.volume)
+    assert counted(lain)[0] == counted(float(np.float32(lain)))[0] == counted(0.9 * lain)[0] == 0.0
+    assert share["overtopped_volume"] - counted(lain)[1]["overtopped_volume"] == pytest.approx(3.0)
+
+    density = behind.flow.material.solid_partial_density
+    start = Snapshot(0.0, 0.0, points.position[lies], {"solid_mass": density * points.volume[lies]})
+    place = np.vstack([start.position, [[6.0, 3.0], [30.0, 0.5]]])
+    ended = Snapshot(1.0, 0.0, place, {"solid_mass": density * np.append(points.volume[lies], [2.0, 1.0])})
+    first, second = barrier_figures(behind, {"time": np.array([0.0, 1.0])}, [start, ended])["barriers"]
+    assert (first["passed_volume"], second["passed_volume"]) == (pytest.approx(3.0), pytest.approx(1.0))
+    assert second["held_volume"] == pytest.approx(lain + 2.0)
+
+    before = scene(barrier=barrier, **{"flow.deposits": [{"shape": deposit["shape"] | {"from_m": -10, "to_m": -2}}]})
+    assert arrival_figures(before, {}, {"overtopped_volume": 3.0})["overtopped_volume"] == 3.0
 
 
 def test_a_fitted_domain_holds_the_approach():

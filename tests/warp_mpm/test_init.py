@@ -6,8 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.cli import app
+from warp_mpm.report.content import flattened
 from warp_mpm.scenario import Scenario
-from warp_mpm.site import KILONEWTON, QUESTIONS, asked, new_scenario
+from warp_mpm.site import KILONEWTON, NOTED, QUESTIONS, asked, new_scenario, notes_still_true
 
 SITE = ["--depth", "2.2", "--length", "15", "--speed", "43.2 km/h", "--slope", "8", "--height", "5", "--crest", "4"]
 
@@ -49,6 +50,23 @@ def test_a_site_in_an_engineers_units(tmp_path):
     # What was not given is in the file.
     assert any("friction angle of the grains: 30 deg (assumed)" in note for note in scenario.notes)
     assert not any("speed" in note for note in scenario.notes)
+    # What follows from the rest would not change with it.
+    assert not any("mass of the barrier" in note or "computed" in note for note in scenario.notes)
+
+
+def test_a_note_goes_with_what_it_says(tmp_path):
+    file = tmp_path / "site.json"
+    assert call(file, *SITE).exit_code == 0
+    scenario = Scenario.load(file)
+    there = [path for path, _ in flattened(scenario.resolved())]
+    for path in NOTED:
+        assert any(one.startswith(path.removesuffix(".0")) for one in there), path
+    kept = notes_still_true(scenario.notes, ["numerics.spacing_m", "barrier.motion.base_friction", "barrier.shape.toe"])
+    gone = set(scenario.notes) - set(kept)
+    assert sorted(note.partition(":")[0] for note in gone) == [
+        "friction coefficient under the barrier",
+        "spacing of the grid",
+    ]
 
 
 @pytest.mark.parametrize(

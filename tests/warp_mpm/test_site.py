@@ -445,6 +445,12 @@ def test_several_barriers_have_forces_motion_and_figures_of_their_own(two):
     assert second["displacement"] == series["second_barrier_displacement"][-1] > 0.1
     assert second["peak_force"] == series["second_force_x"].max() > 1e4
     assert second["first_force_time"] > first["first_force_time"]
+    # The run's impulse is that on the face; a row has that too, and the one on the whole barrier.
+    assert first["face_impulse"] == summary["impulse"]
+    face, interval = series["second_face_force_x"], np.diff(series["time"])
+    assert second["face_impulse"] == pytest.approx(float(face[1:] @ interval))
+    assert second["impulse"] == pytest.approx(float(series["second_force_x"][1:] @ interval))
+    assert first["impulse"] != first["face_impulse"]
     whole = two.scenario.flow.volume
     left = summary["left_volume"]
     assert first["held_volume"] + second["held_volume"] + second["passed_volume"] + left == pytest.approx(whole)

@@ -21,6 +21,7 @@ from warp_mpm.by_simulation.limits import DESIGN_FIELDS, DISPLACEMENTS, Limit, e
 from warp_mpm.by_simulation.runs import Run, coarse
 from warp_mpm.scenario import Scenario, Sliding, Trapezoid
 from warp_mpm.scenario_errors import ScenarioError
+from warp_mpm.site import notes_still_true
 
 FINER = (math.sqrt(2.0), 2.0)
 """How much finer the runs are that confirm an answer: with the coarse one three spacings, as an extrapolation needs."""
@@ -451,6 +452,9 @@ def answer_scenario(answer: Answer) -> Scenario:
         "title": f"{question.scenario.title}: lightest with {limits}"[:200],
         "numerics.spacing_m": answer.rungs[-1].spacing if answer.rungs else question.spacing,
     }
+    found = ", ".join(f"{path} = {value:.6g}" for path, value in question.values(best.point).items())
+    kept = notes_still_true(question.scenario.notes, [*question.values(best.point), "numerics.spacing_m"])
+    changes["notes"] = [*kept, f"found by simulation as the lightest that keeps the limits: {found}"]
     if fields:
         design = scene.design.model_dump(mode="json") if scene.design is not None else {}
         changes["design"] = design | fields

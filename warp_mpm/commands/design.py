@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from analytic.command_line import INTERRUPTED, complain, refusals
+from analytic.command_line import refusals
+from warp_mpm.commands.by_simulation import begun, ended, runs_in, say
 
 NONE_FOUND = 4
 """Exit code where no barrier within the ranges keeps the limits, or the finer run breaks them."""
@@ -79,10 +78,9 @@ def design(
         from warp_mpm.by_simulation.barrier import FINER, Question, check_ranges, lightest, objective_of
         from warp_mpm.by_simulation.fields import check_once, freed, read_range, typed
         from warp_mpm.by_simulation.limits import limits_of, read_limits
-        from warp_mpm.by_simulation.runs import COARSE_CELLS, Runs, claim
+        from warp_mpm.by_simulation.runs import COARSE_CELLS
         from warp_mpm.by_simulation.tables import PICTURE, content, told, write_answer
-        from warp_mpm.caveats import scene_caveats
-        from warp_mpm.commands.options import print_rows, with_options
+        from warp_mpm.commands.options import with_options
         from warp_mpm.scenario import Scenario
 
         scenario = with_options(Scenario.load(scenario_file), spacing=None, until=until)
@@ -110,28 +108,15 @@ def design(
             loose, ranges, limits, objective_of(loose, minimize), coarse_spacing, fine, tolerance, samples
         )
         check_ranges(question)
-        folder = out if out is not None else Path("runs") / f"design_{scenario_file.stem}"
-        claim(folder, "design")
-        say = lambda sentence: typer.echo(sentence, err=True)  # noqa: E731
-        for sentence in (*follows, *(f"Note: {one}" for one in scene_caveats(scenario))):
-            say(sentence)
-        try:
-            with Runs(folder, jobs=jobs or os.cpu_count() or 1, device=device) as runs:
-                answer = lightest(question, runs, say=lambda what: say(f"{runs.made + runs.found} runs: {what}"))
-        except KeyboardInterrupt:
-            complain(f"Interrupted; the runs that ended are in {folder}. The same command goes on from there.")
-            raise typer.Exit(INTERRUPTED) from None
+        folder = begun("design", scenario_file, out, scenario, follows)
+        with runs_in(folder, jobs, device) as runs:
+            answer = lightest(question, runs, say=lambda what: say(f"{runs.made + runs.found} runs: {what}"))
         write_answer(folder, answer)
         from warp_mpm.by_simulation.pictures import search_chart
         from warp_mpm.plotting import save
 
         save(search_chart(answer), folder / PICTURE)
-    if as_json:
-        typer.echo(json.dumps(content(answer), indent=2, ensure_ascii=False))
-    else:
-        print_rows(told(answer))
-        for sentence in answer.remarks:
-            typer.echo(f"Note: {sentence}")
+    ended(content(answer), told(answer), [f"Note: {sentence}" for sentence in answer.remarks], as_json=as_json)
     say(f"{runs.made} runs made, {runs.found} found; table, chart and scenario: {folder}")
     if answer.best is None or answer.confirmed is False:
         raise typer.Exit(NONE_FOUND)

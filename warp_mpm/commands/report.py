@@ -17,8 +17,8 @@ def report(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="The page, or the PDF.",
-            show_default="report.html or .pdf in the run folder; of several, comparison.html or .pdf here",
+            help="The page, the PDF or the workbook.",
+            show_default="report.html, .pdf or .xlsx in the run folder; of several, comparison.html … here",
         ),
     ] = None,
     times: Annotated[
@@ -28,23 +28,36 @@ def report(
     pdf: Annotated[
         bool, typer.Option("--pdf", help="A PDF to hand over, in place of the page: cover, pictures, appendix.")
     ] = False,
+    xlsx: Annotated[
+        bool, typer.Option("--xlsx", help="A workbook, in place of the page: tables and time series as numbers.")
+    ] = False,
 ) -> None:
     """Write one HTML page that tells and shows all of a run, or of several side by side.
 
     The page needs no network and no other file: the flow to play and to point at, forces, motion and energies with the
     closed form over them, still pictures, key figures, ledger, effects, settings, versions and warnings. The page
-    prints on A4; --pdf writes the same to hand over, without what moves.
+    prints on A4; --pdf writes the same to hand over, without what moves. --xlsx writes figures, verdict, ledger,
+    settings and time series for a spreadsheet (pip install '.[xlsx]').
     """
     with refusals():
+        if xlsx and (pdf or times is not None):
+            raise ValueError(f"--xlsx does not go with {'--pdf' if pdf else '--times'}; a workbook has no pictures.")
         from warp_mpm.recording.run_folder import REPORT
         from warp_mpm.results import Results
 
         wanted = times_of(times)
         target = out if out is not None else (runs[0] / REPORT if len(runs) == 1 else Path("comparison.html"))
-        target = target.with_suffix(".pdf") if pdf and out is None else target
+        if out is None and (pdf or xlsx):
+            target = target.with_suffix(".pdf" if pdf else ".xlsx")
         results = [Results.open(run) for run in runs]
         if target.is_dir() or not target.parent.is_dir():
             raise ValueError(f"--out {target} must be a file in a folder that exists.")
+        if xlsx:
+            from warp_mpm.report.workbook import write_workbook
+
+            write_workbook(results, target)
+            typer.echo(f"{target} ({target.stat().st_size / 1e6:.2g} MB)")
+            return
         if pdf:
             from warp_mpm.report.pdf import write_pdf as write
         else:

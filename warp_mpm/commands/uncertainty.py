@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from analytic.command_line import INTERRUPTED, complain, refusals
+from analytic.command_line import refusals
+from warp_mpm.commands.by_simulation import begun, ended, runs_in, say
 
 
 def uncertainty(
@@ -59,10 +58,9 @@ def uncertainty(
     with refusals():
         from warp_mpm.by_simulation.fields import check_once, freed, typed
         from warp_mpm.by_simulation.limits import limits_of, read_limits
-        from warp_mpm.by_simulation.runs import COARSE_CELLS, Runs, claim
+        from warp_mpm.by_simulation.runs import COARSE_CELLS
         from warp_mpm.by_simulation.tables import STUDY_PICTURE, study_content, study_told, write_study
         from warp_mpm.by_simulation.uncertain import design_of, read_uncertain, study
-        from warp_mpm.caveats import scene_caveats
         from warp_mpm.commands.options import with_options
         from warp_mpm.scenario import Scenario
 
@@ -76,37 +74,23 @@ def uncertainty(
         coarse_spacing = spacing if spacing is not None else scenario.flow.depth / COARSE_CELLS
         plan = design_of(loose, uncertain, runs, spacing=coarse_spacing, seed=seed)
         scenes = plan.scenes()
-        folder = out if out is not None else Path("runs") / f"uncertainty_{scenario_file.stem}"
-        claim(folder, "uncertainty")
-        for sentence in (*follows, *(f"Note: {one}" for one in scene_caveats(scenario))):
-            typer.echo(sentence, err=True)
+        folder = begun("uncertainty", scenario_file, out, scenario, follows)
         told: set[int] = set()
 
         def progress(done: int, total: int) -> None:
             tenth = 10 * done // max(total, 1)
             if tenth not in told:
                 told.add(tenth)
-                typer.echo(f"{done} of {total} runs", err=True)
+                say(f"{done} of {total} runs")
 
-        try:
-            with Runs(folder, jobs=jobs or os.cpu_count() or 1, device=device, on_progress=progress) as engine:
-                made = engine(scenes)
-            found = study(plan, limits, made, seed=seed)
-        except KeyboardInterrupt:
-            complain(f"Interrupted; the runs that ended are in {folder}. The same command goes on from there.")
-            raise typer.Exit(INTERRUPTED) from None
+        with runs_in(folder, jobs, device, progress) as runs_made:
+            found = study(plan, limits, runs_made(scenes), seed=seed)
         write_study(folder, found)
         from warp_mpm.by_simulation.pictures import study_chart
         from warp_mpm.plotting import save
 
         save(study_chart(found), folder / STUDY_PICTURE)
-    if as_json:
-        typer.echo(json.dumps(study_content(found), indent=2, ensure_ascii=False))
-    else:
-        from warp_mpm.commands.options import print_rows
-
-        print_rows(study_told(found))
-        typer.echo("Not counted: the error of the coarse runs themselves (python -m warp_mpm design, accuracy).")
-        for sentence in found.remarks:
-            typer.echo(f"Note: {sentence}")
-    typer.echo(f"{engine.made} runs made, {engine.found} found; table and chart: {folder}", err=True)
+    notes = ["Not counted: the error of the coarse runs themselves (python -m warp_mpm design, accuracy)."]
+    notes += [f"Note: {sentence}" for sentence in found.remarks]
+    ended(study_content(found), study_told(found), notes, as_json=as_json)
+    say(f"{runs_made.made} runs made, {runs_made.found} found; table and chart: {folder}")

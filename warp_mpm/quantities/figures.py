@@ -100,7 +100,9 @@ _ROWS = (
         "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=FORCE,
     ),
     Figure(
-        "impulse", "N s/m", "time integral of the horizontal force on the impacted face over the whole run",
+        "impulse", "N s/m",
+        "time integral of the horizontal force on the impacted face over the whole run; in the rows of barriers that "
+        "is face_impulse, and impulse the one on the whole barrier, crest and back included",
         "impulse", needs=FORCE,
     ),
     Figure(
@@ -209,7 +211,8 @@ _ROWS = (
     ),
     Figure(
         "overtopped_volume", "m3/m",
-        "material beyond the crest at the end, without what has left the domain (left_volume)",
+        "material beyond the crest at the end that did not lie there as a deposit at the start; left_volume is what "
+        "has left the domain",
         "volume overtopped", short="beyond",
     ),
     Figure(
@@ -245,7 +248,8 @@ _ROWS = (
     Figure(
         "barriers", "-",
         "of a scene with further barriers: a row for each, from upstream to downstream, with the force on the whole of "
-        "it, its motion, the volumes held before and passed beyond its crest at the end, and how far from its heel the "
+        "it, its impulse and that of its face alone, its motion, the volumes held before its crest at the end and "
+        "passed beyond it, and how far from its heel the "
         "first of what passed was on the ground (docs/how_to/site.md)",
         number=False,
     ),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -61,11 +61,13 @@ class Checkpointer:
         interval: float | None,
         *,
         wall_before: float = 0.0,
+        asked: Callable[[], bool] = lambda: False,
     ):
-        """Args: interval: simulated time between checkpoints [s], None: by wall time; wall_before: time spent [s]."""
+        """Args: interval: simulated time between checkpoints [s], None: by wall time; wall_before: time spent [s];
+        asked: whether somebody wants one now."""
         self._folder, self._scene, self._recorders = folder, fingerprint(scenario), recorders
         self._schedule = Schedule(interval) if interval is not None else None
-        self._start = time.perf_counter() - wall_before
+        self._start, self._asked = time.perf_counter() - wall_before, asked
         self._next_wall = -float("inf")
 
     def after_records(self, simulation: Any, *, stopping: bool) -> None:
@@ -76,7 +78,7 @@ class Checkpointer:
         """
         now = time.perf_counter()
         due = self._schedule.passed(simulation.time) if self._schedule is not None else now >= self._next_wall
-        if not (due or stopping):
+        if not (self._asked() or due or stopping):
             return
         state: bytes = simulation.save_state()
         header = {

@@ -19,6 +19,7 @@ from warp_mpm.quantities import Quantity, Sampled
 from warp_mpm.quantities.figures import FIGURES
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
+from warp_mpm.scenario import Scenario
 from warp_mpm.scenario.site import all_standing
 from warp_mpm.terminal import summary_rows
 
@@ -82,10 +83,12 @@ def run_content(results: Results, name: str) -> dict[str, Any]:
         "versions": _versions(record),
         "warnings": [*_unfinished(results), *scene_caveats(scenario), *run_caveats(record, results.summary), *no_fit],
         "notes": list(scenario.notes),
-        "ground": _ground(results),
-        "barriers": _barriers(results),
-        "section": _section(results),
-    }
+    } | setting(scenario)
+
+
+def setting(scenario: Scenario) -> dict[str, Any]:
+    """What stands around the flow, for the viewer: `ground`, `barriers` and `section`."""
+    return {"ground": _ground(scenario), "barriers": _barriers(scenario), "section": _section(scenario)}
 
 
 def flattened(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
@@ -100,12 +103,17 @@ def flattened(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, A
 
 
 def ledger(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What was there, what came and went, and what is not accounted for."""
-    rows = []
+    """The rows of `ledger_values` in words and units."""
+    return [(words, one.text(value).removesuffix(" -")) for words, value, one in ledger_values(series, summary)]
+
+
+def ledger_values(series: Mapping[str, Array], summary: Mapping[str, Any]) -> list[tuple[str, float, Quantity]]:
+    """What was there, what came and went, and what is not accounted for: words, value in SI units, what it is."""
+    rows: list[tuple[str, float, Quantity]] = []
 
     def row(label: str, value: float | None, quantity: Quantity) -> None:
         if value is not None:
-            rows.append((label, quantity.text(value).removesuffix(" -")))
+            rows.append((label, value, quantity))
 
     def column(name: str, when: str = "", label: str = "") -> None:
         quantity = NAMED[name]
@@ -244,16 +252,16 @@ def _line(time: Array, values: Array, label: str, colour: int, style: str) -> di
     }
 
 
-def _ground(results: Results) -> list[list[float]] | None:
+def _ground(scenario: Scenario) -> list[list[float]] | None:
     """Points of the ground's surface, which goes on straight beyond them."""
-    ground = results.scenario.ground
+    ground = scenario.ground
     return None if ground is None else ground.profile.tolist()
 
 
-def _barriers(results: Results) -> list[dict[str, Any]]:
+def _barriers(scenario: Scenario) -> list[dict[str, Any]]:
     """Outline of each barrier, from upstream to downstream; of a wall without end its foot."""
-    ground, found = results.scenario.ground, []
-    for name, x, _, standing in all_standing(results.scenario):
+    ground, found = scenario.ground, []
+    for name, x, _, standing in all_standing(scenario):
         if standing is None:
             foot = 0.0 if ground is None else float(ground.height(x))
             found.append({"name": name, "kind": "wall", "corners": [[x, foot]]})
@@ -262,9 +270,9 @@ def _barriers(results: Results) -> list[dict[str, Any]]:
     return found
 
 
-def _section(results: Results) -> list[list[float]] | None:
+def _section(scenario: Scenario) -> list[list[float]] | None:
     """Foot and top of the section of an inflow."""
-    inflow = results.scenario.flow.inflow
+    inflow = scenario.flow.inflow
     if inflow is None:
         return None
     return [[inflow.x_m, inflow.base], [inflow.x_m, inflow.base + inflow.greatest_depth]]

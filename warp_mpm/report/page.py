@@ -60,12 +60,12 @@ def write_report(runs: Sequence[Results], target: str | Path, *, times: Sequence
     data = {
         "runs": contents,
         "times": stills,
-        "colours": {kind: _palette(name) for kind, name in COLOURS.items()},
+        "colours": {kind: palette(name) for kind, name in COLOURS.items()},
     }
     page = Template((ASSETS / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         style=(ASSETS / "style.css").read_text(encoding="utf-8"),
-        data=_embedded(data),
+        data=embedded(data),
         points="\n".join(
             f'<script type="application/octet-stream" id="points-{index}">{blob}</script>'
             for index, blob in enumerate(blobs)
@@ -83,13 +83,13 @@ def _distinct_names(runs: Sequence[Results]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(results.path) for results in runs]
 
 
-def _embedded(data: Any) -> str:
+def embedded(data: Any) -> str:
     """JSON that cannot end the script element that it stands in."""
     text = json.dumps(finite(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
-def _palette(name: str) -> str:
+def palette(name: str) -> str:
     """256 colours as one string of hexadecimal digits, six each."""
     colours = matplotlib.colormaps[name](np.linspace(0.0, 1.0, 256))[:, :3]
     return np.rint(255 * colours).astype(np.uint8).tobytes().hex()

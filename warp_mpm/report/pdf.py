@@ -196,8 +196,8 @@ def _cover(book: _Book, contents: Sequence[dict[str, Any]]) -> None:
             book.text(f"Source: {content['source']}")
         for sentence in content["warnings"]:
             book.text(f"Note: {sentence}", colour="#A05A00")
-        for sentence in content["notes"]:
-            book.text(f"Assumed or remarked: {sentence}", size=8.0, colour="#61656B")
+        if content["notes"]:
+            book.text(f"Assumed or remarked: {'; '.join(content['notes'])}.", size=8.0, colour="#61656B")
     book.heading("Key figures and verdict")
     _tables(book, contents, "figures")
     book.skip(4.0)

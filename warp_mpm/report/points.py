@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.fields import FIELDS, colour_limits, field_values
+from warp_mpm.quantities.points import Drawn
 from warp_mpm.results import Results
+from warp_mpm.scenario import Scenario
+from warp_mpm.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 
@@ -31,10 +34,8 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
         times: [s] of snapshots that are kept in any case.
     """
     snapshots = results.snapshots
-    solid_density = results.scenario.flow.material.solid_partial_density
     numbers = [len(snapshot.position) for snapshot in snapshots]
-    fields = [field for field in FIELDS if field_values(snapshots[0], field.name, solid_density) is not None]
-    per_point = 2 * (2 + len(fields))
+    per_point = 2 * (2 + len(_fields(results.scenario, snapshots[0])))
 
     whole = per_point * sum(numbers)
     frame_stride = max(1, min(-(-whole // budget), len(numbers) // 60))
@@ -44,13 +45,32 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
     size = per_point * sum(numbers[frame] for frame in frames)
     point_stride = max(1, -(-size // budget))
 
-    quantities = [[] for _ in range(2 + len(fields))]  # type: list[list[Array]]
-    times_kept, shifts = [], []
-    for frame in frames:
-        snapshot = snapshots[frame]
-        times_kept.append(snapshot.time)
-        moved = results.barrier_displacements(snapshot)
-        shifts.append([moved.get(name, 0.0) for name, _, _ in results.scenario.all_barriers])
+    moved = ((snapshots[frame], results.barrier_displacements(snapshots[frame])) for frame in frames)
+    description, blob = packed_frames(results.scenario, moved, point_stride)
+    return description | {"frame_stride": frame_stride}, blob
+
+
+def packed_frames(
+    scenario: Scenario, frames: Iterable[tuple[Snapshot, Mapping[str, float]]], point_stride: int
+) -> tuple[dict[str, Any], str]:
+    """Snapshots and the displacements of the barriers at their times [m], by name, packed as of `packed`.
+
+    Args:
+        scenario: of the run.
+        frames: at least one.
+        point_stride: of so many points one is kept.
+    """
+    solid_density = scenario.flow.material.solid_partial_density
+    fields: list[Drawn] = []
+    quantities: list[list[Array]] = []
+    times: list[float] = []
+    shifts: list[list[float]] = []
+    for snapshot, moved in frames:
+        if not times:
+            fields = _fields(scenario, snapshot)
+            quantities = [[] for _ in range(2 + len(fields))]
+        times.append(snapshot.time)
+        shifts.append([moved.get(name, 0.0) for name, _, _ in scenario.all_barriers])
         columns = [*snapshot.position.T, *(field_values(snapshot, field.name, solid_density) for field in fields)]
         for column, values in zip(quantities, columns, strict=True):
             assert values is not None
@@ -58,12 +78,12 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
 
     ranges = [_range(column) for column in quantities]
     parts = []
-    for index in range(len(frames)):
+    for index in range(len(times)):
         for column, (low, high) in zip(quantities, ranges, strict=True):
             share = (np.nan_to_num(column[index], nan=low) - low) / (high - low)
             parts.append(np.rint(np.clip(share, 0.0, 1.0) * LEVELS).astype("<u2").tobytes())
     description = {
-        "times": [round(time, 6) for time in times_kept],
+        "times": [round(time, 6) for time in times],
         "shifts": shifts,
         "counts": [len(values) for values in quantities[0]],
         "ranges": ranges,
@@ -77,13 +97,18 @@ def packed(results: Results, budget: int, times: Sequence[float]) -> tuple[dict[
             }
             for field, column in zip(fields, quantities[2:], strict=True)
         ],
-        "diameter": _diameter(results, point_stride),
-        "frame_stride": frame_stride,
+        "diameter": _diameter(scenario, point_stride),
         "point_stride": point_stride,
         "window": _window(quantities[0], quantities[1]),
         "start": [float(side(axis[0])) for axis in quantities[:2] for side in (np.min, np.max)],
     }
     return description, base64.b64encode(zlib.compress(b"".join(parts), 9)).decode("ascii")
+
+
+def _fields(scenario: Scenario, snapshot: Snapshot) -> list[Drawn]:
+    """Those that a snapshot has."""
+    solid_density = scenario.flow.material.solid_partial_density
+    return [field for field in FIELDS if field_values(snapshot, field.name, solid_density) is not None]
 
 
 def _range(column: Iterable[Array]) -> tuple[float, float]:
@@ -93,9 +118,9 @@ def _range(column: Iterable[Array]) -> tuple[float, float]:
     return low, high if high > low else low + 1.0
 
 
-def _diameter(results: Results, point_stride: int) -> float:
+def _diameter(scenario: Scenario, point_stride: int) -> float:
     """Diameter [m] with which the points of the undeformed flow cover it."""
-    numerics = results.scenario.numerics
+    numerics = scenario.numerics
     return 1.3 * numerics.spacing_m * (point_stride / numerics.points_per_cell) ** 0.5
 
 

@@ -52,6 +52,11 @@ class Trapezoid(Model):
         return self
 
     @property
+    def crest_end(self) -> float:
+        """Way from the toe to the downstream end of the crest [m]."""
+        return float(self.polygon[2, 0])
+
+    @property
     def base_crest_height(self) -> tuple[float, float, float]:
         """B, b, H [m], the missing one from B - b = 2 H / tan β."""
         base, crest, height = self.base_width_m, self.crest_width_m, self.height_m
