@@ -116,7 +116,7 @@ PYTHON_UNITS = (
     ),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
     PythonUnit(
-        *("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+        *("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py", "protocol.py")),
         quantity_modules=("quantity.py", "time_series.py"),
     ),
 )

@@ -27,7 +27,7 @@ import fmpy
 from analytic.version import PROJECT, project_version
 from fmu import documentation, fmi3_description
 from fmu.archive import ROOT, BuildError, scenario_for, write_archive
-from fmu.units import worker_process
+from fmu.units import protocol, worker_process
 from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface, Variable
 from fmu.units.model_description import guid, model_description
@@ -266,7 +266,7 @@ def table_header(unit: CUnit, identity: str) -> str:
             f'#define RECORD "{worker_process.PLAIN_RECORD}"',
             f'#define SCENARIO "{SCENARIO}"',
             f'#define LAUNCH "{worker_process.LAUNCH}"',
-            f"#define PROTOCOL {worker_process.PROTOCOL}",
+            f"#define PROTOCOL {protocol.PROTOCOL}",
         ]
     lines += [
         "",

@@ -214,40 +214,65 @@ def parameters(
         print_table(f"Start values of BarrierSliding: {scene.title}", ["", *start_values.WAYS, "unit"], rows, found)
 
 
-@app.command(epilog="Example: python -m fmu benchmark --spacing 0.4")
+@app.command(epilog="Example: python -m fmu benchmark --page docs/cosimulation.md")
 def benchmark(
     scenario: Annotated[
         Path | None, typer.Option(help="Scenario inside DebrisFlow.", show_default="scenarios/set_iib.json")
     ] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid spacing [m].", show_default="the scenario's")] = None,
+    until: Annotated[float | None, typer.Option(help="End time [s].", show_default="the scenario's")] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            help="Markdown page to put the tables into, below its lines <!-- benchmark NAME -->.", show_default=False
+        ),
+    ] = None,
 ) -> None:
-    """Measure what the units cost: a step of the closed form through fmpy, and DebrisFlow over the plain simulation."""
+    """Measure what the units cost: a step of the closed form through fmpy, start and steps of the simulator's units.
+
+    All are measured in one run and take turns, the plain simulation among them, so that other work on the machine
+    changes the ratios little.
+    """
     from analytic.cli.terminal import print_table
     from fmu import archive, c_unit
     from fmu.benchmark import closed_form_costs, simulator_costs
+    from warp_mpm import Scenario
+    from warp_mpm.performance.benchmark import machine
+    from warp_mpm.performance.table import put_into_page
 
-    if scenario is not None:
-        _check_scenario(scenario)
+    chosen = scenario or archive.DEFAULT_SCENARIO
+    _check_scenario(chosen)
+    if page is not None and not (page.is_file() and "<!-- benchmark simulator -->" in page.read_text(encoding="utf-8")):
+        _refuse(f"--page {page} must be a file with lines <!-- benchmark NAME --> and <!-- end -->.")
+
+    def told(what: str) -> None:
+        typer.echo(f"measuring: {what}", err=True)
+
     with tempfile.TemporaryDirectory(prefix="fmu_benchmark_") as temporary:
         folder = Path(temporary)
-        units = {unit.name: unit for unit in archive.PYTHON_UNITS}
         try:
-            closed_form = [
-                archive.build_python_unit(units["BarrierSliding"], folder),
-                c_unit.build_c_unit(c_unit.C_UNITS[0], folder, platforms=(c_unit.host_platform(),)),
+            simulated = with_options(Scenario.load(chosen), spacing=spacing, until=until)
+            built: dict[str, list[Path]] = {"BarrierSliding": [], "DebrisFlow": []}
+            for packed in archive.PYTHON_UNITS:
+                if packed.name in built:
+                    built[packed.name].append(archive.build_python_unit(packed, folder, scenario=chosen))
+            for unit in c_unit.C_UNITS:
+                if unit.base in built and c_unit.offered(unit, c_unit.host_platform()):
+                    platforms = (c_unit.host_platform(),)
+                    built[unit.base].append(c_unit.build_c_unit(unit, folder, platforms=platforms, scenario=chosen))
+            tables = [
+                closed_form_costs(built["BarrierSliding"], progress=told),
+                simulator_costs(built["DebrisFlow"], simulated, end_time=simulated.output.end_time_s, progress=told),
             ]
-            simulator = archive.build_python_unit(units["DebrisFlow"], folder, scenario=scenario)
-            costs = closed_form_costs(closed_form)
-            costs += simulator_costs(simulator, scenario or archive.DEFAULT_SCENARIO, spacing)
+            for table in tables:
+                print_table(table.title, list(table.columns), [list(row) for row in table.rows])
+            if page is not None:
+                taken_on = machine()
+                put_into_page(
+                    page, tables, f"{taken_on['processor']}, Python {taken_on['python']}, {taken_on['taken']}"
+                )
         except (archive.BuildError, ValueError) as error:
             _refuse(str(error))
-    rows = []
-    for cost in costs:
-        value = f"{cost.value:+.1%}" if cost.unit == "%" else f"{cost.value:.2g} s"
-        if cost.unit == "s" and cost.value < 1e-3:
-            value = f"{1e6 * cost.value:.2g} µs"
-        rows.append([cost.what, value])
-    print_table("Cost of the units, wall time", ["", "measured"], rows)
 
 
 def _build(
