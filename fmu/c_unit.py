@@ -46,6 +46,8 @@ class CUnit:
     """``2.0`` or ``3.0``."""
     derivatives: int = 0
     """Highest order of the derivatives of outputs that the model gives."""
+    directional: bool = False
+    """Whether it gives derivatives of outputs with respect to inputs and tunable parameters."""
     own_sources: tuple[str, ...] = ()
     """C files that the model includes."""
     posix_only: bool = False
@@ -58,7 +60,9 @@ class CUnit:
     @property
     def interface(self) -> Interface:
         table: Interface = importlib.import_module(f"fmu.units.{self.module}").INTERFACE
-        return replace(table, name=self.name, output_derivatives=self.derivatives)
+        return replace(
+            table, name=self.name, output_derivatives=self.derivatives, directional_derivatives=self.directional
+        )
 
     @property
     def compiled(self) -> str:
@@ -70,8 +74,8 @@ C_UNITS = tuple(
     unit
     for fmi in ("2.0", "3.0")
     for unit in (
-        CUnit("BarrierSliding", "barrier_sliding", fmi, derivatives=1),
-        CUnit("GroundAnchor", "ground_anchor", fmi),
+        CUnit("BarrierSliding", "barrier_sliding", fmi, derivatives=1, directional=True),
+        CUnit("GroundAnchor", "ground_anchor", fmi, directional=True),
         CUnit("DebrisFlow", "debris_flow", fmi, own_sources=("process.c",), posix_only=True),
     )
 )
