@@ -26,7 +26,7 @@ import fmpy
 
 from analytic.version import PROJECT, project_version
 from fmu import documentation, fmi3_description
-from fmu.archive import ROOT, BuildError, scenario_for, write_archive
+from fmu.archive import ROOT, BuildError, scenario_for, whole, write_archive
 from fmu.units import protocol, worker_process
 from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface, Variable
@@ -157,7 +157,7 @@ def build_c_unit(
     entries |= _binaries(unit, sources, chosen)
     entries |= documentation.entries(interface, version, packer="c")
     if unit.base == "DebrisFlow":
-        entries[f"resources/{SCENARIO}"] = scenario_for(scenario).read_bytes()
+        entries[f"resources/{SCENARIO}"] = whole(scenario_for(scenario))
         if recorded:
             entries[f"resources/{worker_process.PLAIN_RECORD}"] = f"{sys.executable}\n{ROOT}\n".encode()
         entries["resources/requirements.txt"] = f"{PROJECT}=={project_version()}\n".encode()

@@ -182,6 +182,7 @@ def parameters(
 ) -> None:
     """Start values of the closed-form unit for a scenario: with the paper's λ and τ, and with fitted ones."""
     from analytic.cli.terminal import number, print_json, print_table
+    from analytic.fitted import CALIBRATED
     from analytic.scene import read_scene
     from fmu import start_values
     from fmu.system import as_xml, parameter_set
@@ -194,24 +195,32 @@ def parameters(
     try:
         scene = read_scene(scenario)
         scene.impact()
-        values = {way: start_values.start_values(scene, way) for way in start_values.WAYS}
+        values = {start_values.PAPER: start_values.start_values(scene, start_values.PAPER)}
+        notes = {way: start_values.notes(scene, way) for way in start_values.WAYS}
+        try:
+            values[CALIBRATED] = start_values.start_values(scene, CALIBRATED)
+        except ValueError as error:  # the paper's numbers are there where the fit has no answer
+            if as_ssv and variant == CALIBRATED:
+                raise
+            notes[CALIBRATED] = (*notes[start_values.PAPER], f"No calibrated values: {error}")
     except ValueError as error:  # of the scenario or the closed form: one sentence each
         _refuse(str(error))
     if as_ssv:
         typer.echo(as_xml(parameter_set(INTERFACE, values[variant])).decode())
+        for note in notes[variant]:
+            typer.echo(note, err=True)
     elif as_json:
-        print_json({**values, "notes": {way: start_values.notes(scene, way) for way in values}})
+        print_json({**values, "notes": notes})
     else:
         names = [v.name for v in INTERFACE.of("parameter") if any(v.name in chosen for chosen in values.values())]
         table = {v.name: v for v in INTERFACE.variables}
         rows = []
         for name in names:
             unit = table[name].unit.name if table[name].kind == "Real" else ""
-            cells = [values[way].get(name, table[name].start) for way in start_values.WAYS]
+            cells = [values[way].get(name, table[name].start) for way in values]
             shown = [str(cell).lower() if isinstance(cell, bool) else number(cell, 6) for cell in cells]
             rows.append([name, *shown, "" if unit == "1" else unit])
-        found = start_values.notes(scene, variant)
-        print_table(f"Start values of BarrierSliding: {scene.title}", ["", *start_values.WAYS, "unit"], rows, found)
+        print_table(f"Start values of BarrierSliding: {scene.title}", ["", *values, "unit"], rows, notes[variant])
 
 
 @app.command(epilog="Example: python -m fmu benchmark --page docs/cosimulation.md")

@@ -20,6 +20,7 @@ from fmpy.validation import validate_fmu
 
 from fmu import archive, c_unit
 from fmu.check import check_archive
+from warp_mpm import Scenario
 
 C_NAMES = [unit.name for unit in c_unit.C_UNITS]
 NAMES = [*(unit.name for unit in archive.PYTHON_UNITS), *C_NAMES]
@@ -215,6 +216,20 @@ def test_reference_of_the_simulator_is_reproduced(tmp_path: Path) -> None:
     assert moved["_external_force"] < moved[""]
     # Driven: 4 m/s2 from 0.3 s on in steps of 0.05 s, then 2 m/s for 0.2 s.
     assert moved["_driven"] == pytest.approx(0.05 * sum(4.0 * 0.05 * n for n in range(10)) + 2.0 * 0.2)
+
+
+def test_tables_beside_a_scenario_come_along(tmp_path: Path) -> None:
+    """A scene whose ground and inflow are files beside it runs from either archive."""
+    path = archive.DEFAULT_SCENARIO.parent / "site_channel.json"
+    for unit in ("DebrisFlow", "DebrisFlowC"):
+        if unit.endswith("C"):
+            (chosen,) = (each for each in c_unit.C_UNITS if each.name == unit)
+            built = c_unit.build_c_unit(chosen, tmp_path, platforms=(c_unit.host_platform(),), scenario=path)
+        else:
+            built = archive.build_python_unit(archive.PYTHON_UNITS[-1], tmp_path, scenario=path)
+        with zipfile.ZipFile(built) as file:
+            inside = Scenario.model_validate(json.loads(file.read("resources/scenario.json")))
+        assert inside.resolved() == Scenario.load(path).resolved()
 
 
 @EACH_PYTHON
