@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analytic.impact import Impact, friction_deceleration
-from analytic.scene import ASSUMED_RISE_RATIO, PAPER_GEOMETRY_CHANGE, Scene
+from analytic.scene import ASSUMED_RISE_RATIO, FITTED_FORMULATION, FITTED_LAW, PAPER_GEOMETRY_CHANGE, Scene
 
 CALIBRATED = "calibrated"
 """Name of the variant."""
@@ -166,6 +166,10 @@ def beyond_fit(scene: Scene) -> list[str]:
         symbol, low, high = FITTED_RANGES[name]
         if value is not None and not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             found.append(f"{symbol} = {value:.3g} is outside the fitted range {low:g} to {high:g}.")
+    if scene.formulation not in (None, FITTED_FORMULATION):
+        found.append(f"The formulation {scene.formulation} is outside the fit, whose flows are {FITTED_FORMULATION}.")
+    if scene.law not in (None, FITTED_LAW):
+        found.append(f"The law {scene.law} is outside the fit, whose flows are {FITTED_LAW}.")
     if scene.slope != 0:
         found.append(f"The slope of {scene.slope:g} degrees is outside the fit, whose ground is level.")
     return found

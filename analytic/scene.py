@@ -15,6 +15,9 @@ from analytic.impact import STANDARD_GRAVITY, Impact
 if TYPE_CHECKING:
     from warp_mpm.scenario import Scenario
 
+FITTED_FORMULATION, FITTED_LAW = "two_phase", "mohr_coulomb"
+"""Of the simulations to which ``analytic.fitted`` is fitted, as of the paper's."""
+
 PAPER_GEOMETRY_CHANGE = {"fixed": 0.72, "sliding": 0.41}
 """The paper's constants lambda = s1max / L_1,0 [-] (section 3.2)."""
 
@@ -55,7 +58,13 @@ class Scene:
     barrier_density: float | None = None
     """[kg/m^3]."""
     distance: float = 0.0
-    """From the flow's front to the toe of the barrier [m]."""
+    """From the flow's front to the toe of the barrier [m]; from the section, of a flow that arrives."""
+    sets_out: float = 0.0
+    """Time [s] at which the front is at that distance: later than 0 for a flow that arrives then."""
+    formulation: str | None = None
+    """Of the simulator's flow: two_phase, undrained or dry."""
+    law: str | None = None
+    """Of the simulator's material."""
     title: str = ""
     remarks: tuple[str, ...] = ()
     """What of the file the scene does not hold."""
@@ -86,12 +95,16 @@ class Scene:
         if self.slope == 0:
             return self.remarks
         pull = self.flow_mass * self.gravity * math.sin(math.radians(self.slope))
-        seen = "" if self.fixed else "the barrier's weight along it is counted, "
+        seen = (
+            "the flow's weight along it is left out"
+            if self.fixed
+            else "the barrier's weight along it is counted, the flow's is left out"
+        )
         effect = "pushes on: forces and displacements come out too small" if pull > 0 else "holds the flow back"
         size = f"{abs(pull) / 1e3:.3g} kN/m"
         return (
             *self.remarks,
-            f"Slope of {self.slope:g} degrees: {seen}the flow's is left out, {size}, which {effect}.",
+            f"Slope of {self.slope:g} degrees: {seen}, {size}, which {effect}.",
         )
 
     @property
@@ -176,12 +189,19 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     remarks = []
     if flow.inflow is not None:
         velocity_x = max(velocity_x, flow.inflow.greatest_speed)
-        remarks.append("Of a flow that arrives the greatest depth and velocity are taken, and all of its volume.")
+        remarks.append(
+            "Of a flow that arrives the greatest depth and velocity are taken, and all of its volume; several surges "
+            "are taken as one."
+        )
     if flow.deposits:
         remarks.append("The deposits are left out.")
     if velocity_x <= 0:
         raise SceneError(f"{name}: flow.velocity_m_per_s[0] is {velocity_x:g}, the flow must move towards the barrier.")
+    if not scenario.gravity.acceleration_m_per_s2 > 0:
+        raise SceneError(f"{name}: gravity.acceleration_m_per_s2 is 0, the closed form needs weight on the base.")
     remarks += slips(scenario)
+    if flow.material.law != FITTED_LAW:
+        remarks.append(f"The material's law, {flow.material.law}, is left out: the closed form knows no strength.")
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
     if scenario.ground is not None and scenario.ground.friction != 0:
@@ -205,5 +225,14 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         barrier_height=shape.base_crest_height[2] if shape.kind != "wall" else math.inf,
         barrier_density=barrier.density,
         distance=-float(flow.polygon[:, 0].max()),
+        sets_out=_first_arrival(flow.inflow) if flow.inflow is not None and flow.shape is None else 0.0,
+        formulation=flow.formulation,
+        law=flow.material.law,
         remarks=tuple(remarks),
     )
+
+
+def _first_arrival(inflow: Any) -> float:
+    """Time [s] from which something arrives: depths are linear between the times of the table."""
+    first = next(place for place, depth in enumerate(inflow.depths_m) if depth > 0)
+    return float(inflow.times_s[max(first - 1, 0)])

@@ -116,7 +116,7 @@ PYTHON_UNITS = (
     ),
     PythonUnit("GroundAnchor", "ground_anchor", "GroundAnchorSlave"),
     PythonUnit(
-        *("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py",)),
+        *("DebrisFlow", "debris_flow", "DebrisFlowSlave", ("worker_process.py", "protocol.py")),
         quantity_modules=("quantity.py", "time_series.py"),
     ),
 )
@@ -226,13 +226,13 @@ def _simulator_resources(scenario: Path, *, recorded: bool = True) -> dict[str, 
     """The scenario that runs unless the importer names another, and which Python has the simulator."""
     record = {"interpreter": sys.executable, "import_path": [str(ROOT)]}
     return {
-        SCENARIO: _whole(scenario),
+        SCENARIO: whole(scenario),
         **({RECORD: json.dumps(record, indent=2).encode()} if recorded else {}),
         "requirements.txt": f"{PROJECT}=={project_version()}\n".encode(),
     }
 
 
-def _whole(scenario: Path) -> bytes:
+def whole(scenario: Path) -> bytes:
     """The scenario in one file: one that names a table beside it, which is not in the archive, with what is in that."""
     content = scenario.read_bytes()
     if b'_csv"' not in content:

@@ -1,93 +1,160 @@
-"""What the units cost: a step through fmpy, and the simulator's unit over the plain simulation."""
+"""What the units cost: a step through fmpy, and the simulator's units over the plain simulation, measured in turns."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from fmu.archive import ROOT
 from fmu.instance import Unit, instance
+from warp_mpm.performance.table import Progress, Table
 
-STEP = 0.01
-"""Communication step of the simulator's unit [s]."""
-TURN = 0.25
-"""Simulated time [s] that the unit and the plain simulation take in turns."""
-ROUNDS, STEPS = 20, 500
-"""Of the closed form: the best of so many rounds of so many steps, for other work may hold the processor."""
-
-
-@dataclass(frozen=True)
-class Cost:
-    """One line of the table."""
-
-    what: str
-    value: float
-    """[s], or a share where `unit` is %."""
-    unit: str
-
-
-def closed_form_costs(archives: list[Path]) -> list[Cost]:
-    """Wall time [s] of a step and of reading all outputs that are numbers, for each archive."""
-    costs = []
-    with tempfile.TemporaryDirectory(prefix="fmu_benchmark_") as folder:
-        for path in archives:
-            with instance(path, Path(folder)) as unit:
-                unit.initialize()
-                costs.append(Cost(f"{path.name}, one step through fmpy, outputs read", _step_time(unit), "s"))
-    return costs
-
-
-def _step_time(unit: Unit) -> float:
-    references = [v.valueReference for v in unit.variables.values() if v.causality == "output" and v.type == "Real"]
-    best = float("inf")
-    for _ in range(ROUNDS):
-        start = time.perf_counter()
-        for _ in range(STEPS):
-            unit.step(1e-4)
-            unit.fmu.getReal(references)
-        best = min(best, (time.perf_counter() - start) / STEPS)
-    return best
-
-
-def simulator_costs(archive: Path, scenario_file: Path, spacing: float | None) -> list[Cost]:
-    """Start of the simulator's unit [s] with its kernels compiled before, and what it adds to the plain simulation.
-
-    Both are asked for all outputs at each communication step, the way fmpy asks. They go on in turns, so that other
-    work on the machine meets both; wall time, for the unit's simulator is another process. Told is the turns' median.
-    """
+if TYPE_CHECKING:
     from warp_mpm import Scenario, Simulation
 
-    scenario = Scenario.load(scenario_file)
-    settings = {}
-    if spacing is not None:
-        scenario, settings = scenario.replaced({"numerics.spacing_m": spacing}), {"spacing": spacing}
+STEP = 0.01
+"""Communication step of the simulator's units [s]."""
+STEPS_A_TURN = 5
+"""Communication steps that each takes before the next has its turn."""
+STARTS = 5
+"""Starts of each, in turn."""
+ROUNDS, STEPS = 20, 500
+"""Of the closed form: the fastest of so many rounds of so many steps, for other work may hold the processor."""
+
+PLAIN = "plain simulation"
+
+_PLAIN_START = (
+    "import sys; sys.path.insert(0, sys.argv[1])\n"
+    "from warp_mpm import Scenario, Simulation\n"
+    "simulation = Simulation(Scenario.load(sys.argv[2])); simulation.prepare(); simulation.sample()\n"
+    "print(flush=True)\n"
+)
+
+Timed = Callable[[], float]
+"""Does something and tells its wall time [s]."""
+
+
+def closed_form_costs(archives: Sequence[Path], *, progress: Progress = lambda what: None) -> Table:
+    """Wall time of a step through fmpy, after which all outputs that are numbers are read."""
+    progress("closed form")
+    with contextlib.ExitStack() as open_units:
+        folder = Path(open_units.enter_context(tempfile.TemporaryDirectory(prefix="fmu_benchmark_")))
+        units = [open_units.enter_context(instance(path, folder)) for path in archives]
+        spent = _in_turns({unit.name: _stepper(unit.initialize(), 1e-4, STEPS) for unit in units}, ROUNDS)
+    fastest = {name: min(times) / STEPS for name, times in spent.items()}
+    least = min(fastest.values())
+    rows = [(name, f"{1e6 * each:.1f}", f"{each / least:.1f}") for name, each in fastest.items()]
+    return Table("closed form", "A step of the closed form through fmpy", ("unit", "a step [µs]", "ratio"), rows)
+
+
+def simulator_costs(
+    archives: Sequence[Path], scenario: Scenario, *, end_time: float, progress: Progress = lambda what: None
+) -> Table:
+    """Start and communication step of the simulator's units beside those of the plain simulation.
+
+    All start with their kernels compiled before, the plain simulation in a process of its own. Each communication step
+    ends with all outputs, the plain simulation's with a sample of all its quantities. They take turns, and nobody
+    always follows the same one; wall time, for a unit's simulator is another process. Told are medians.
+
+    Parameters
+    ----------
+    archives: units that have the scenario inside.
+    scenario: what is simulated; the units are given its spacing.
+    end_time: [s] to which all run.
+    progress: called with what is being measured.
+    """
+    from warp_mpm import Simulation
+
+    spacing = scenario.numerics.spacing_m
     simulation = Simulation(scenario)
     simulation.prepare()
-    with tempfile.TemporaryDirectory(prefix="fmu_benchmark_") as folder:
-        with instance(archive, Path(folder), settings) as unit:
-            unit.initialize()
-        with instance(archive, Path(folder), settings) as unit:
-            start = time.perf_counter()
-            unit.initialize()
-            begun = time.perf_counter() - start
-            excesses = []
-            for turn in range(1, int(scenario.output.end_time_s / TURN) + 1):
-                start = time.perf_counter()
-                for _ in range(round(TURN / STEP)):
-                    unit.step(STEP)
-                    unit.real_outputs()
-                between = time.perf_counter()
-                for step in range(round(TURN / STEP)):
-                    simulation.advance(until=(turn - 1) * TURN + (step + 1) * STEP)
-                    simulation.sample()
-                excesses.append((between - start) / (time.perf_counter() - between) - 1.0)
-    return [
-        Cost(f"{archive.name}, start with its kernels compiled before", begun, "s"),
-        Cost(
-            f"{archive.name}, {scenario_file.stem}, {STEP:g} s: over a plain simulation sampled as often",
-            statistics.median(excesses),
-            "%",
-        ),
-    ]
+    simulation.sample()
+    with contextlib.ExitStack() as open_units:
+        folder = Path(open_units.enter_context(tempfile.TemporaryDirectory(prefix="fmu_benchmark_")))
+        file = folder / "scenario.json"
+        file.write_text(json.dumps(scenario.resolved()), encoding="utf-8")
+        units = [open_units.enter_context(instance(path, folder, {"spacing": spacing})) for path in archives]
+        progress("start")
+        starts: dict[str, Timed] = {PLAIN: partial(_start_plain, file)}
+        starts |= {unit.name: partial(_start, unit) for unit in units}
+        begun = _in_turns(starts, STARTS)
+        progress("communication steps")
+        steps: dict[str, Timed] = {PLAIN: partial(_step_plain, simulation)}
+        steps |= {unit.name: _stepper(unit, STEP, STEPS_A_TURN) for unit in units}
+        taken = _in_turns(steps, max(1, round(end_time / (STEP * STEPS_A_TURN))))
+    rows = []
+    for name in steps:
+        start, step = statistics.median(begun[name]), 1e3 * statistics.median(taken[name]) / STEPS_A_TURN
+        over_start, over_step = f"{_over(begun[name], begun[PLAIN]):+.0%}", f"{_over(taken[name], taken[PLAIN]):+.1%}"
+        over = ("", "") if name == PLAIN else (over_start, over_step)
+        rows.append((name, f"{start:.2f}", over[0], f"{step:.1f}", over[1]))
+    title = f"The simulator, {scenario.title}, {spacing:g} m, communication step {STEP:g} s"
+    return Table("simulator", title, ("", "start [s]", "over plain", "a step [ms]", "over plain"), rows)
+
+
+def _stepper(unit: Unit, size: float, steps: int) -> Timed:
+    """Takes steps [s] and reads all outputs that are numbers after each, as fmpy does."""
+    kinds = ("Real", "Float64")
+    references = [v.valueReference for v in unit.variables.values() if v.causality == "output" and v.type in kinds]
+    read = unit.fmu.getFloat64 if unit.fmi3 else unit.fmu.getReal
+
+    def take() -> float:
+        start = time.perf_counter()
+        for _ in range(steps):
+            unit.step(size)
+            read(references)
+        return time.perf_counter() - start
+
+    return take
+
+
+def _step_plain(simulation: Simulation) -> float:
+    begun, start = simulation.time, time.perf_counter()
+    for step in range(1, STEPS_A_TURN + 1):
+        simulation.advance(until=begun + step * STEP)
+        simulation.sample()
+    return time.perf_counter() - start
+
+
+def _start(unit: Unit) -> float:
+    unit.fmu.reset()
+    start = time.perf_counter()
+    unit.initialize()
+    return time.perf_counter() - start
+
+
+def _start_plain(scenario_file: Path) -> float:
+    start = time.perf_counter()
+    command = [sys.executable, "-P", "-c", _PLAIN_START, str(ROOT), str(scenario_file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        begun = time.perf_counter() - start
+    if process.returncode:
+        raise ValueError(f"The plain simulation of {scenario_file} did not start.")
+    return begun
+
+
+def _in_turns(calls: Mapping[str, Timed], rounds: int) -> dict[str, list[float]]:
+    """Wall times [s] of each call, which take turns in an order that goes round."""
+    names = list(calls)
+    spent: dict[str, list[float]] = {name: [] for name in names}
+    for turn in range(rounds):
+        for place in range(len(names)):
+            name = names[(place + turn) % len(names)]
+            spent[name].append(calls[name]())
+    return spent
+
+
+def _over(times: Sequence[float], plain: Sequence[float]) -> float:
+    """What one takes over the other, as the median over the turns: what slows the machine slows all of a turn."""
+    return statistics.median(mine / others for mine, others in zip(times, plain, strict=True)) - 1.0

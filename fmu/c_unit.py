@@ -26,8 +26,8 @@ import fmpy
 
 from analytic.version import PROJECT, project_version
 from fmu import documentation, fmi3_description
-from fmu.archive import ROOT, BuildError, scenario_for, write_archive
-from fmu.units import worker_process
+from fmu.archive import ROOT, BuildError, scenario_for, whole, write_archive
+from fmu.units import protocol, worker_process
 from fmu.units.debris_flow import SCENARIO
 from fmu.units.interface import Interface, Variable
 from fmu.units.model_description import guid, model_description
@@ -46,6 +46,8 @@ class CUnit:
     """`2.0` or `3.0`."""
     derivatives: int = 0
     """Highest order of the derivatives of outputs that the model gives."""
+    directional: bool = False
+    """Whether it gives derivatives of outputs with respect to inputs and tunable parameters."""
     own_sources: tuple[str, ...] = ()
     """C files that the model includes."""
     posix_only: bool = False
@@ -58,7 +60,9 @@ class CUnit:
     @property
     def interface(self) -> Interface:
         table: Interface = importlib.import_module(f"fmu.units.{self.module}").INTERFACE
-        return replace(table, name=self.name, output_derivatives=self.derivatives)
+        return replace(
+            table, name=self.name, output_derivatives=self.derivatives, directional_derivatives=self.directional
+        )
 
     @property
     def compiled(self) -> str:
@@ -70,8 +74,8 @@ C_UNITS = tuple(
     unit
     for fmi in ("2.0", "3.0")
     for unit in (
-        CUnit("BarrierSliding", "barrier_sliding", fmi, derivatives=1),
-        CUnit("GroundAnchor", "ground_anchor", fmi),
+        CUnit("BarrierSliding", "barrier_sliding", fmi, derivatives=1, directional=True),
+        CUnit("GroundAnchor", "ground_anchor", fmi, directional=True),
         CUnit("DebrisFlow", "debris_flow", fmi, own_sources=("process.c",), posix_only=True),
     )
 )
@@ -151,7 +155,7 @@ def build_c_unit(
     entries |= _binaries(unit, sources, chosen)
     entries |= documentation.entries(interface, version, packer="c")
     if unit.base == "DebrisFlow":
-        entries[f"resources/{SCENARIO}"] = scenario_for(scenario).read_bytes()
+        entries[f"resources/{SCENARIO}"] = whole(scenario_for(scenario))
         if recorded:
             entries[f"resources/{worker_process.PLAIN_RECORD}"] = f"{sys.executable}\n{ROOT}\n".encode()
         entries["resources/requirements.txt"] = f"{PROJECT}=={project_version()}\n".encode()
@@ -263,7 +267,7 @@ def table_header(unit: CUnit, identity: str) -> str:
             f'#define RECORD "{worker_process.PLAIN_RECORD}"',
             f'#define SCENARIO "{SCENARIO}"',
             f'#define LAUNCH "{worker_process.LAUNCH}"',
-            f"#define PROTOCOL {worker_process.PROTOCOL}",
+            f"#define PROTOCOL {protocol.PROTOCOL}",
         ]
     lines += [
         "",

@@ -183,6 +183,7 @@ def parameters(
 ) -> None:
     """Start values of the closed-form unit for a scenario: with the paper's λ and τ, and with fitted ones."""
     from analytic.cli.terminal import number, print_json, print_table
+    from analytic.fitted import CALIBRATED
     from analytic.scene import read_scene
     from fmu import start_values
     from fmu.system import as_xml, parameter_set
@@ -195,60 +196,93 @@ def parameters(
     try:
         scene = read_scene(scenario)
         scene.impact()
-        values = {way: start_values.start_values(scene, way) for way in start_values.WAYS}
+        values = {start_values.PAPER: start_values.start_values(scene, start_values.PAPER)}
+        notes = {way: start_values.notes(scene, way) for way in start_values.WAYS}
+        try:
+            values[CALIBRATED] = start_values.start_values(scene, CALIBRATED)
+        except ValueError as error:  # the paper's numbers are there where the fit has no answer
+            if as_ssv and variant == CALIBRATED:
+                raise
+            notes[CALIBRATED] = (*notes[start_values.PAPER], f"No calibrated values: {error}")
     except ValueError as error:  # of the scenario or the closed form: one sentence each
         _refuse(str(error))
     if as_ssv:
         typer.echo(as_xml(parameter_set(INTERFACE, values[variant])).decode())
+        for note in notes[variant]:
+            typer.echo(note, err=True)
     elif as_json:
-        print_json({**values, "notes": {way: start_values.notes(scene, way) for way in values}})
+        print_json({**values, "notes": notes})
     else:
         names = [v.name for v in INTERFACE.of("parameter") if any(v.name in chosen for chosen in values.values())]
         table = {v.name: v for v in INTERFACE.variables}
         rows = []
         for name in names:
             unit = table[name].unit.name if table[name].kind == "Real" else ""
-            cells = [values[way].get(name, table[name].start) for way in start_values.WAYS]
+            cells = [values[way].get(name, table[name].start) for way in values]
             shown = [str(cell).lower() if isinstance(cell, bool) else number(cell, 6) for cell in cells]
             rows.append([name, *shown, "" if unit == "1" else unit])
-        found = start_values.notes(scene, variant)
-        print_table(f"Start values of BarrierSliding: {scene.title}", ["", *start_values.WAYS, "unit"], rows, found)
+        print_table(f"Start values of BarrierSliding: {scene.title}", ["", *values, "unit"], rows, notes[variant])
 
 
-@app.command(epilog="Example: python -m fmu benchmark --spacing 0.4")
+@app.command(epilog="Example: python -m fmu benchmark --page docs/cosimulation.md")
 def benchmark(
     scenario: Annotated[
         Path | None, typer.Option(help="Scenario inside DebrisFlow.", show_default="scenarios/set_iib.json")
     ] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid spacing [m].", show_default="the scenario's")] = None,
+    until: Annotated[float | None, typer.Option(help="End time [s].", show_default="the scenario's")] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            help="Markdown page to put the tables into, below its lines <!-- benchmark NAME -->.", show_default=False
+        ),
+    ] = None,
 ) -> None:
-    """Measure what the units cost: a step of the closed form through fmpy, and DebrisFlow over the plain simulation."""
+    """Measure what the units cost: a step of the closed form through fmpy, start and steps of the simulator's units.
+
+    All are measured in one run and take turns, the plain simulation among them, so that other work on the machine
+    changes the ratios little.
+    """
     from analytic.cli.terminal import print_table
     from fmu import archive, c_unit
     from fmu.benchmark import closed_form_costs, simulator_costs
+    from warp_mpm import Scenario
+    from warp_mpm.performance.benchmark import machine
+    from warp_mpm.performance.table import put_into_page
 
-    if scenario is not None:
-        _check_scenario(scenario)
+    chosen = scenario or archive.DEFAULT_SCENARIO
+    _check_scenario(chosen)
+    if page is not None and not (page.is_file() and "<!-- benchmark simulator -->" in page.read_text(encoding="utf-8")):
+        _refuse(f"--page {page} must be a file with lines <!-- benchmark NAME --> and <!-- end -->.")
+
+    def told(what: str) -> None:
+        typer.echo(f"measuring: {what}", err=True)
+
     with tempfile.TemporaryDirectory(prefix="fmu_benchmark_") as temporary:
         folder = Path(temporary)
-        units = {unit.name: unit for unit in archive.PYTHON_UNITS}
         try:
-            closed_form = [
-                archive.build_python_unit(units["BarrierSliding"], folder),
-                c_unit.build_c_unit(c_unit.C_UNITS[0], folder, platforms=(c_unit.host_platform(),)),
+            simulated = with_options(Scenario.load(chosen), spacing=spacing, until=until)
+            built: dict[str, list[Path]] = {"BarrierSliding": [], "DebrisFlow": []}
+            for packed in archive.PYTHON_UNITS:
+                if packed.name in built:
+                    built[packed.name].append(archive.build_python_unit(packed, folder, scenario=chosen))
+            for unit in c_unit.C_UNITS:
+                if unit.base in built and c_unit.offered(unit, c_unit.host_platform()):
+                    platforms = (c_unit.host_platform(),)
+                    built[unit.base].append(c_unit.build_c_unit(unit, folder, platforms=platforms, scenario=chosen))
+            tables = [
+                closed_form_costs(built["BarrierSliding"], progress=told),
+                simulator_costs(built["DebrisFlow"], simulated, end_time=simulated.output.end_time_s, progress=told),
             ]
-            simulator = archive.build_python_unit(units["DebrisFlow"], folder, scenario=scenario)
-            costs = closed_form_costs(closed_form)
-            costs += simulator_costs(simulator, scenario or archive.DEFAULT_SCENARIO, spacing)
+            for table in tables:
+                print_table(table.title, list(table.columns), [list(row) for row in table.rows])
+            if page is not None:
+                taken_on = machine()
+                put_into_page(
+                    page, tables, f"{taken_on['processor']}, Python {taken_on['python']}, {taken_on['taken']}"
+                )
         except (archive.BuildError, ValueError) as error:
             _refuse(str(error))
-    rows = []
-    for cost in costs:
-        value = f"{cost.value:+.1%}" if cost.unit == "%" else f"{cost.value:.2g} s"
-        if cost.unit == "s" and cost.value < 1e-3:
-            value = f"{1e6 * cost.value:.2g} µs"
-        rows.append([cost.what, value])
-    print_table("Cost of the units, wall time", ["", "measured"], rows)
 
 
 def _build(

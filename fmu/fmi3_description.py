@@ -77,6 +77,7 @@ def model_description(
             "maxOutputDerivativeOrder": str(interface.output_derivatives),
             "canGetAndSetFMUState": "true",
             "canSerializeFMUState": "true",
+            "providesDirectionalDerivatives": boolean(interface.directional_derivatives),
             "hasEventMode": "false",
         },
     )

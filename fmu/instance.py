@@ -23,6 +23,7 @@ class Unit:
 
         description = read_model_description(str(path))
         self.variables = {v.name: v for v in description.modelVariables}
+        self.name = path.name
         self.fmi3 = description.fmiVersion.startswith("3")
         self.fmu = (FMU3Slave if self.fmi3 else FMU2Slave)(
             guid=description.guid,

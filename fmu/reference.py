@@ -62,6 +62,21 @@ _CASES: dict[str, dict[str, Case]] = {
 }
 
 
+def pulled_inputs(time: float) -> dict[str, float]:
+    """Something that pulls a sliding barrier back with 100 kN/m from 0.5 s on."""
+    return {"barrier_velocity_input": 0.0, "external_force": -100e3 if time >= 0.5 else 0.0}
+
+
+def driven_inputs(time: float) -> dict[str, float]:
+    """Another unit that sets the barrier in motion from 0.3 s on, 4 m/s2 up to 2 m/s."""
+    return {"barrier_velocity_input": min(max(4.0 * (time - 0.3), 0.0), 2.0), "external_force": 0.0}
+
+
+def still_inputs(time: float) -> dict[str, float]:
+    """The scenario alone."""
+    return {"barrier_velocity_input": 0.0, "external_force": 0.0}
+
+
 SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE = 1.0, 0.05, 0.01
 """End and communication step [s] of the simulator's reference run, and how near another machine must come to it."""
 
@@ -73,33 +88,47 @@ def base_of(name: str) -> str:
 
 def files(interface: Interface) -> dict[str, bytes]:
     """The reference files of a unit by name; none for the simulator's, see ``simulated_files``."""
-    found: dict[str, bytes] = {}
-    for way, case in _CASES.get(base_of(interface.name), {}).items():
-        slave = case.slave(instance_name="reference", resources="")
-        for name, value in case.start.items():
-            slave[name] = value
-        name = f"{interface.name}_{way}" if way else interface.name
-        found |= _run(slave, interface, name, case.inputs, interface.stop_time, interface.step_size, 1e-9)
-        if case.start:
-            found[f"{name}_start.csv"] = (_header(list(case.start)) + _row(*case.start.values())).encode()
-    return found
+    cases = _CASES.get(base_of(interface.name), {})
+    return _cases(interface, cases, (interface.stop_time, interface.step_size, 1e-9))
 
 
 def simulated_files(resources: Path) -> dict[str, bytes]:
-    """The reference files of ``DebrisFlow`` with the scenario in ``resources``.
+    """The reference files of ``DebrisFlow`` with the scenario in ``resources``: as the scenario says and, where it has
+    such a barrier, with a force on it and driven.
 
     Raises
     ------
     UnitError: the simulator cannot run it.
     """
-    slave = debris_flow.DebrisFlowSlave(instance_name="reference", resources=str(resources))
-    still = {v.name: 0.0 for v in debris_flow.INTERFACE.of("input")}
-    try:
-        interface = debris_flow.INTERFACE
-        times = (SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE)
-        return _run(slave, interface, interface.name, lambda time: still, *times)
-    finally:
-        slave.close()
+    from warp_mpm.scenario import Scenario
+
+    barrier = Scenario.load(resources / debris_flow.SCENARIO).barrier
+    cases = {"": Case(debris_flow.DebrisFlowSlave, still_inputs)}
+    if barrier is not None and barrier.motion.kind == "sliding":
+        cases["external_force"] = Case(debris_flow.DebrisFlowSlave, pulled_inputs)
+    if barrier is not None:
+        cases["driven"] = Case(debris_flow.DebrisFlowSlave, driven_inputs, {"barrier_motion": 2})
+    times = (SIMULATED_END, SIMULATED_STEP, SIMULATED_TOLERANCE)
+    return _cases(debris_flow.INTERFACE, cases, times, resources)
+
+
+def _cases(
+    interface: Interface, cases: Mapping[str, Case], times: tuple[float, float, float], resources: Path | None = None
+) -> dict[str, bytes]:
+    """The files of all cases; times: end, communication step [s], and tolerance."""
+    found: dict[str, bytes] = {}
+    for way, case in cases.items():
+        slave = case.slave(instance_name="reference", resources=str(resources or ""))
+        for name, value in case.start.items():
+            slave[name] = value
+        name = f"{interface.name}_{way}" if way else interface.name
+        try:
+            found |= _run(slave, interface, name, case.inputs, *times)
+        finally:
+            slave.close()
+        if case.start:
+            found[f"{name}_start.csv"] = (_header(list(case.start)) + _row(*case.start.values())).encode()
+    return found
 
 
 def _run(

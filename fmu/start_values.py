@@ -59,7 +59,7 @@ def start_values(scene: Scene, way: str) -> dict[str, Any]:
 
     The arrival is that of a front which goes on at the flow's speed.
     """
-    values = scene_parameters(scene) | {"arrival_time": max(scene.distance, 0.0) / scene.speed}
+    values = scene_parameters(scene) | {"arrival_time": scene.sets_out + max(scene.distance, 0.0) / scene.speed}
     values |= force_parameters(scene, way)
     return {variable.name: values[variable.name] for variable in INTERFACE.variables if variable.name in values}
 

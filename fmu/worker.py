@@ -15,7 +15,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from fmu.units.worker_process import PROTOCOL, RECORDED
+from fmu.units.protocol import PROTOCOL, RECORDED, SURFACE_FORCES
+from warp_mpm.quantities.time_series import NAMED
+
+KEYS = {name: NAMED[name].key for name in RECORDED}
+"""Of the outputs, in the simulator's samples."""
+SAMPLED = frozenset({*KEYS.values(), *(f"{surface}_{axis}" for surface in SURFACE_FORCES for axis in "xy")})
+"""All that a sample is asked for: more would cost at every step."""
 
 HOST_CHECK_INTERVAL = 0.5
 """Time between looks at whether the host is still there [s], for a host that ends during a long step."""
@@ -35,9 +41,12 @@ class Worker:
         self.last_key = 0
         self.barrier_velocity: float | None = None
         self.external_force = 0.0
+        self.crest_end: float | None = None
+        """x of the crest's downstream end before the barrier moves [m]; None without a crest."""
 
     def open(self, *, scenario: str, device: str, spacing: float | None, driven: bool) -> dict[str, Any]:
         from warp_mpm import Scenario, Simulation
+        from warp_mpm.scenario.barrier import Trapezoid
 
         self.scenario = Scenario.load(Path(scenario))
         changes: dict[str, Any] = {}
@@ -49,6 +58,9 @@ class Worker:
             changes["barrier.motion"] = {"kind": "prescribed", "times_s": [0.0], "velocities_m_per_s": [0.0]}
         if changes:
             self.scenario = self.scenario.replaced(changes)
+        shape = self.scenario.barrier.shape if self.scenario.barrier is not None else None
+        if isinstance(shape, Trapezoid):  # a wall has no crest
+            self.crest_end = float(shape.polygon[2, 0])
         self.simulation = Simulation(self.scenario, device=device)
         self.simulation.prepare()
         return {}
@@ -71,29 +83,27 @@ class Worker:
         return self.sample() | ({} if gauge is None else self.count(gauge=gauge))
 
     def sample(self) -> dict[str, Any]:
-        from warp_mpm.quantities.time_series import NAMED
-
-        values = self.simulation.sample()
+        values = self.simulation.sample(SAMPLED)
         wrong = [name for name, value in values.items() if not math.isfinite(value)]
         if wrong:
             raise RefusedRequestError(f"The simulation gave {values[wrong[0]]} for {wrong[0]}.")
-        surfaces = ("impact_force", "top_force", "back_force")
         return {
-            **{name: values.get(NAMED[name].key, 0.0) for name in RECORDED},
-            "barrier_force": sum(values.get(f"{surface}_x", 0.0) for surface in surfaces),
-            "vertical_load": 0.0 - sum(values.get(f"{surface}_y", 0.0) for surface in surfaces),
+            **{name: values.get(key, 0.0) for name, key in KEYS.items()},
+            "barrier_force": sum(values.get(f"{surface}_x", 0.0) for surface in SURFACE_FORCES),
+            "vertical_load": 0.0 - sum(values.get(f"{surface}_y", 0.0) for surface in SURFACE_FORCES),
         }
 
     def count(self, *, gauge: float) -> dict[str, Any]:
-        """What takes all material points: volume beyond the crest, and depth at the gauge, a place along x [m]."""
-        from warp_mpm.mechanism import deposit
-
+        """What takes all material points: volume beyond the crest as in ``mechanism.deposit``, and depth at the gauge,
+        a place along x [m]. At every step it would cost to look at more than is told."""
+        points, reach = self.simulation.points(("position", "volume", "solid_mass")), self.scenario.numerics.spacing_m
+        x = points["position"][:, 0]
         volume = 0.0
-        if self.scenario.barrier is not None:
-            volume = deposit(self.scenario, _Present(self.simulation))["overtopped_volume"] or 0.0  # type: ignore[arg-type]
-        reach, points = self.scenario.numerics.spacing_m, self.simulation.points(("position", "volume"))
-        near = abs(points["position"][:, 0] - gauge) <= reach
-        return {"overtopped_volume": volume, "gauge_depth": float(points["volume"][near].sum()) / (2.0 * reach)}
+        if self.crest_end is not None:
+            beyond = points["solid_mass"][x > self.crest_end + self.simulation.barrier_displacement]
+            volume = float(beyond.sum()) / self.scenario.flow.material.solid_partial_density
+        depth = float(points["volume"][abs(x - gauge) <= reach].sum()) / (2.0 * reach)
+        return {"overtopped_volume": volume, "gauge_depth": depth}
 
     def save_state(self) -> dict[str, Any]:
         self.last_key += 1
@@ -123,18 +133,6 @@ class Worker:
         inputs, _, simulation_state = state.partition(b"\n")
         self.simulation.restore_state(simulation_state)
         self.barrier_velocity, self.external_force = json.loads(inputs)
-
-
-class _Present:
-    """The simulation's present state in the shape of a snapshot."""
-
-    def __init__(self, simulation: Any) -> None:
-        self._points = simulation.points(("position", "solid_mass"))
-        self.position = self._points["position"]
-        self.barrier_displacement = simulation.barrier_displacement
-
-    def __getitem__(self, name: str) -> Any:
-        return self._points[name]
 
 
 def main() -> None:

@@ -28,13 +28,20 @@ static double wait_time(double direction, double force, double force_rate, doubl
     return rate > 0 ? -excess / rate : INFINITY;
 }
 
-/* Slide for a duration, under a force and a friction that are linear in time. */
+/* A small change of what a slide begins with and of what acts during it; force and friction change linearly in time. */
+typedef struct {
+    double displacement, velocity, force, friction, friction_rate;
+} Change;
+
+/* Slide for a duration, under a force and a friction that are linear in time. With a change (or NULL) it tells how the
+   end changes to first order, as long as the same stretches of sliding and rest follow each other: a stop or a start
+   comes earlier or later, and what it shifts is taken into account. */
 static void slide(double *displacement, double *velocity, double duration, double force, double force_rate,
-                  double friction, double friction_rate, double mass) {
-    double t = 0;
+                  double friction, double friction_rate, double mass, Change *change) {
+    double t = 0, sooner = 0; /* by which the last stop comes */
     while (t < duration) {
         double direction = copysign(1.0, *velocity);
-        int waited = 0;
+        int waited = 0, rested = *velocity == 0;
         if (*velocity == 0) {
             direction = breakaway(force, force_rate, friction, friction_rate);
             if (direction == 0) {
@@ -46,14 +53,27 @@ static void slide(double *displacement, double *velocity, double duration, doubl
                 t += wait;
                 force += wait * force_rate;
                 friction += wait * friction_rate;
+                if (change) change->friction += wait * change->friction_rate;
                 waited = 1; /* it sets out with force and friction equal, whatever rounding says */
             }
         }
         double acceleration = waited ? 0.0 : (force - direction * friction) / mass;
         double jerk = (force_rate - direction * friction_rate) / mass;
+        if (change && rested) change->velocity = waited ? 0 : sooner * acceleration;
         double slip = first_stop(*velocity, acceleration, jerk);
         int stops = t + slip < duration;
         double until = stops ? t + slip : duration, u = until - t;
+        if (change) {
+            double by = (change->force - direction * change->friction) / mass;
+            double by_rate = -direction * change->friction_rate / mass;
+            change->displacement += u * (change->velocity + u * (by / 2 + u * by_rate / 6));
+            change->velocity += u * (by + u * by_rate / 2);
+            change->friction += u * change->friction_rate;
+            if (stops) {
+                sooner = change->velocity / (acceleration + u * jerk);
+                change->velocity = 0;
+            }
+        }
         *displacement += u * (*velocity + u * (acceleration / 2 + u * jerk / 6));
         *velocity = stops ? 0 : *velocity + u * (acceleration + u * jerk / 2);
         if (!stops) return;
@@ -80,11 +100,6 @@ static void force_pieces(const Impact *impact, double peak_force, Piece pieces[4
     pieces[3] = (Piece){T2, INFINITY, 0, 0};
 }
 
-/* What acts on the barrier beside the impact: along the base, and normal to it. */
-typedef struct {
-    double pushing, pressing;
-} Loads;
-
 static Loads loads_on(const Impact *impact, double external, double vertical) {
     double weight = impact->mass * impact->gravity;
     return (Loads){external + weight * impact->sine, fmax(weight * impact->cosine + vertical, 0)};
@@ -95,9 +110,15 @@ static double friction_deceleration(const Impact *impact) {
     return impact->fixed ? 0 : impact->gravity * (impact->tangent * impact->cosine - impact->sine);
 }
 
-/* Carry the barrier from the time `start` to `stop` under the triangle of force and the loads. */
+/* Change of the base's friction with its coefficient and the load normal to it; none where nothing presses. */
+static double friction_change(const Impact *impact, double pressing, double by_tangent, double by_pressing) {
+    return pressing > 0 ? by_tangent * pressing + impact->tangent * by_pressing : 0;
+}
+
+/* Carry the barrier from the time `start` to `stop` under the triangle of force and the loads. What changes, if
+   anything: the push, the coefficient of friction, the load normal to the base. */
 static void carry(const Impact *impact, double peak_force, double start, double stop, Loads loads,
-                  double *displacement, double *velocity) {
+                  double *displacement, double *velocity, Change *change, double by_tangent, double by_pressing) {
     Piece pieces[4];
     if (impact->fixed) return;
     force_pieces(impact, peak_force, pieces);
@@ -105,9 +126,13 @@ static void carry(const Impact *impact, double peak_force, double start, double 
         double from = fmax(pieces[i].start, start), to = fmin(pieces[i].stop, stop), rate = pieces[i].rate;
         if (!(to > from)) continue;
         double force = rate != 0 ? pieces[i].force + (from - pieces[i].start) * rate : pieces[i].force;
-        double share = impact->vertical_load_ratio;
-        slide(displacement, velocity, to - from, force + loads.pushing, rate,
-              impact->tangent * (loads.pressing + share * force), impact->tangent * share * rate, impact->mass);
+        double share = impact->vertical_load_ratio, pressing = loads.pressing + share * force;
+        if (change) {
+            change->friction = friction_change(impact, pressing, by_tangent, loads.pressing > 0 ? by_pressing : 0);
+            change->friction_rate = by_tangent * share * rate;
+        }
+        slide(displacement, velocity, to - from, force + loads.pushing, rate, impact->tangent * pressing,
+              impact->tangent * share * rate, impact->mass, change);
     }
 }
 
@@ -170,7 +195,8 @@ static void follow_closed_form(Model *model, double time) {
     } else if (impact->variant == VARIANT_AS_PRINTED && !impact->fixed) {
         printed_barrier(impact, since, &model->displacement, &model->velocity);
     } else {
-        carry(impact, impact->peak_force, 0, since, loads_on(impact, 0, 0), &model->displacement, &model->velocity);
+        carry(impact, impact->peak_force, 0, since, loads_on(impact, 0, 0), &model->displacement, &model->velocity,
+              NULL, 0, 0);
     }
 }
 
@@ -183,7 +209,7 @@ static double momentum_closed_impulse(const Impact *impact) {
     double R = impact->mass * deceleration / share;
     double reduced_mass = impact->flow_mass / (1 + impact->flow_mass / driven_mass);
     double displacement = 0, velocity = impact->initial_velocity;
-    carry(impact, 2 * stopping / T2, 0, T2, loads_on(impact, 0, 0), &displacement, &velocity);
+    carry(impact, 2 * stopping / T2, 0, T2, loads_on(impact, 0, 0), &displacement, &velocity, NULL, 0, 0);
     if (velocity <= 0) return stopping;
     double never_at_rest = reduced_mass * (impact->speed - impact->initial_velocity + deceleration * T2);
     double ratio = R * T2 / (2 * never_at_rest), rise_ratio = impact->rise_time / T2;
@@ -266,6 +292,7 @@ static int advance(Unit *unit, double end) {
     if (tuned && !check_friction(unit, tangent)) return 0;
     impact->tangent = tangent;
     Loads loads = loads_on(impact, external, load);
+    model->last = (Last){start, model->displacement, model->velocity, model->peak_force, loads};
     if (!model->integrated && !acted) {
         follow_closed_form(model, end);
         write_outputs(unit, end, loads);
@@ -275,13 +302,13 @@ static int advance(Unit *unit, double end) {
     if (impact->force_is_input) {
         if (!impact->fixed)
             slide(&model->displacement, &model->velocity, end - start, force + loads.pushing, 0,
-                  friction_under(impact, loads, force), 0, impact->mass);
+                  friction_under(impact, loads, force), 0, impact->mass, NULL);
         model->force = force;
         model->impulse += force * (end - start);
         model->peak_force = fmax(model->peak_force, force);
     } else {
         carry(impact, impact->peak_force, start - impact->arrival, end - impact->arrival, loads,
-              &model->displacement, &model->velocity);
+              &model->displacement, &model->velocity, NULL, 0, 0);
         model->force = force_at(impact, end - impact->arrival);
     }
     write_outputs(unit, end, loads);
@@ -332,7 +359,8 @@ static int unit_start(Unit *unit) {
         return advance(unit, unit->state.time);
     }
     follow_closed_form(model, unit->state.time);
-    write_outputs(unit, unit->state.time, loads_on(impact, 0, 0));
+    model->last = (Last){unit->state.time, model->displacement, model->velocity, model->peak_force, loads_on(impact, 0, 0)};
+    write_outputs(unit, unit->state.time, model->last.loads);
     return 1;
 }
 
@@ -390,6 +418,43 @@ static int unit_rate(Unit *unit, int reference, double *rate) {
         return 1;
     default: return refuse(unit, "%s has no derivative.", TABLE[reference].name);
     }
+}
+
+/* --- derivatives of the outputs with respect to what acted during the last step ----------------------------------------- */
+
+static int unit_slope(Unit *unit, const double *by, double *slope) {
+    const Model *model = &unit->state.model;
+    const Impact *impact = &model->impact;
+    const Last *last = &model->last;
+    double end = unit->state.time, duration = end - last->time, share = impact->vertical_load_ratio;
+    double by_tangent = impact->fixed ? 0 : by[BASE_FRICTION], by_force = impact->force_is_input ? by[IMPACT_FORCE_INPUT] : 0;
+    if (impact->variant == VARIANT_AS_PRINTED && !impact->force_is_input)
+        return refuse(unit, "variant is 3 (as_printed), which is a set of functions of time and takes no inputs: choose 1 "
+                            "(stick_slip) for derivatives with respect to them.");
+    if (!model->integrated && last->time < impact->arrival && last->velocity != 0)
+        return refuse(unit, "Before the flow arrives the barrier moves with barrier_initial_velocity, whatever acts on it: there "
+                            "are derivatives after a step that begins at arrival_time, %g s, or later.", impact->arrival);
+    double displacement = last->displacement, velocity = last->velocity;
+    Change change = {0, 0, by_force + by[EXTERNAL_FORCE], 0, 0};
+    if (impact->force_is_input && !impact->fixed) {
+        double pressing = last->loads.pressing + share * model->force;
+        double by_pressing = (last->loads.pressing > 0 ? by[VERTICAL_LOAD] : 0) + share * by_force;
+        change.friction = friction_change(impact, pressing, by_tangent, by_pressing);
+        slide(&displacement, &velocity, duration, model->force + last->loads.pushing, 0,
+              friction_under(impact, last->loads, model->force), 0, impact->mass, &change);
+    } else {
+        carry(impact, impact->peak_force, last->time - impact->arrival, end - impact->arrival, last->loads, &displacement,
+              &velocity, &change, by_tangent, by[VERTICAL_LOAD]);
+    }
+    slope[IMPACT_FORCE] = by_force;
+    slope[PEAK_FORCE] = model->force > last->peak_force ? by_force : 0;
+    slope[PEAK_PRESSURE] = slope[PEAK_FORCE] / impact->flow_height;
+    slope[BARRIER_VELOCITY] = change.velocity;
+    slope[BARRIER_DISPLACEMENT] = change.displacement;
+    slope[FLOW_VELOCITY] = -by_force * duration / impact->flow_mass;
+    slope[FLOW_KINETIC_ENERGY] = impact->flow_mass * unit->state.values[FLOW_VELOCITY] * slope[FLOW_VELOCITY];
+    slope[BARRIER_KINETIC_ENERGY] = impact->fixed ? 0 : impact->mass * model->velocity * change.velocity;
+    return 1;
 }
 
 NOTHING_BEYOND_THE_STATE

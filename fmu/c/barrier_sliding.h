@@ -11,8 +11,20 @@ typedef struct {
     double impulse, peak_force;          /* J [N s/m], F_peak [N/m] */
 } Impact;
 
+/* What acts on the barrier beside the impact: along the base, and normal to it. */
+typedef struct {
+    double pushing, pressing;
+} Loads;
+
+/* How the last step began and what acted during it, for derivatives with respect to that. */
+typedef struct {
+    double time, displacement, velocity, peak_force;
+    Loads loads;
+} Last;
+
 typedef struct {
     Impact impact;
+    Last last;
     int integrated; /* whether a load has acted from outside: the motion is then carried from step to step */
     double displacement, velocity;
     double impulse, peak_force; /* so far, where the force is an input */

@@ -350,6 +350,11 @@ static int unit_rate(Unit *unit, int reference, double *rate) {
     return refuse(unit, "This unit does not offer derivatives.");
 }
 
+static int unit_slope(Unit *unit, const double *by, double *slope) {
+    (void)by, (void)slope;
+    return refuse(unit, "This unit does not offer directional derivatives.");
+}
+
 /* Counted for an importer that asks, and from then on within each step. */
 static int unit_read(Unit *unit, int reference) {
     Model *model = &unit->state.model;

@@ -160,6 +160,12 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     return fmi2OK;
 }
 
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t many,
+                                        const fmi2ValueReference knowns[], size_t count, const fmi2Real seeds[],
+                                        fmi2Real changes[]) {
+    return done(c, get_slopes(UNIT(c), unknowns, many, knowns, count, seeds, changes));
+}
+
 /* --- state ------------------------------------------------------------------------------------------------------ */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) { return done(c, save_state(UNIT(c), state)); }
@@ -183,12 +189,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 }
 
 /* --- what the unit does not offer --------------------------------------------------------------------------------- */
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t nu,
-                                        const fmi2ValueReference k[], size_t nk, const fmi2Real dk[], fmi2Real du[]) {
-    (void)u, (void)nu, (void)k, (void)nk, (void)dk, (void)du;
-    return not_offered(c, "directional derivatives");
-}
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real values[]) {

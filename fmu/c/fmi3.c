@@ -162,6 +162,13 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
     return fmi3OK;
 }
 
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t many,
+                                        const fmi3ValueReference knowns[], size_t count, const fmi3Float64 seeds[],
+                                        size_t seed_count, fmi3Float64 changes[], size_t change_count) {
+    if (!alike(UNIT(c), count, seed_count) || !alike(UNIT(c), many, change_count)) return done(c, 0);
+    return done(c, get_slopes(UNIT(c), unknowns, many, knowns, count, seeds, changes));
+}
+
 #define NO_VARIABLES(NAME)                                                                                             \
     fmi3Status fmi3Get##NAME(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##NAME values[], size_t m) { \
         (void)vr, (void)values, (void)m;                                                                               \
@@ -255,11 +262,6 @@ NOT_OFFERED(fmi3GetVariableDependencies,
              fmi3DependencyKind kinds[], size_t n),
             ((void)dependent, (void)elements, (void)independents, (void)others, (void)kinds, (void)n),
             "dependencies of elements")
-NOT_OFFERED(fmi3GetDirectionalDerivative,
-            (fmi3Instance c, const Reference u[], size_t nu, const Reference k[], size_t nk, const Real seed[],
-             size_t seeds, Real sensitivity[], size_t sensitivities),
-            ((void)u, (void)nu, (void)k, (void)nk, (void)seed, (void)seeds, (void)sensitivity, (void)sensitivities),
-            "directional derivatives")
 NOT_OFFERED(fmi3GetAdjointDerivative,
             (fmi3Instance c, const Reference u[], size_t nu, const Reference k[], size_t nk, const Real seed[],
              size_t seeds, Real sensitivity[], size_t sensitivities),

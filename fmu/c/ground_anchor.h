@@ -3,7 +3,8 @@
 #define GROUND_ANCHOR_H
 
 typedef struct {
-    double plastic_elongation; /* [m] */
+    double plastic_elongation, plastic_before; /* now, and before the last step [m] */
+    double stiffness, yield_force;             /* of the last step */
 } Model;
 
 PLAIN_STATE

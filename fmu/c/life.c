@@ -232,6 +232,30 @@ static int get_rate(Unit *unit, unsigned reference, int order, double *rate) {
     return unit_rate(unit, (int)reference, rate);
 }
 
+/* Change of the unknowns, outputs all of them, per change of the knowns: inputs and tunable parameters. */
+static int get_slopes(Unit *unit, const unsigned unknowns[], size_t many, const unsigned knowns[], size_t count,
+                      const double seeds[], double changes[]) {
+    double by[VARIABLE_COUNT] = {0}, slope[VARIABLE_COUNT] = {0};
+    for (size_t i = 0; i < many; i++) {
+        if (!known(unit, REAL, unknowns[i])) return 0;
+        if (TABLE[unknowns[i]].causality != OUTPUT)
+            return refuse(unit, "This unit does not offer derivatives of %s, which is no output.", TABLE[unknowns[i]].name);
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (!known(unit, REAL, knowns[i])) return 0;
+        if (TABLE[knowns[i]].causality != INPUT && !TABLE[knowns[i]].tunable)
+            return refuse(unit, "This unit does not offer derivatives with respect to %s, which is neither an input nor a "
+                                "tunable parameter.", TABLE[knowns[i]].name);
+        if (!isfinite(seeds[i])) return refuse(unit, "The change of %s is no number.", TABLE[knowns[i]].name);
+        by[knowns[i]] += seeds[i];
+    }
+    if (unit->state.life != STEPPING && unit->state.life != INITIALIZATION) return out_of_order(unit, "Reading a derivative");
+    if (unit->state.life == INITIALIZATION && unit->state.stale && !begin(unit)) return undefine_outputs(unit), 0;
+    if (!unit_slope(unit, by, slope)) return 0;
+    for (size_t i = 0; i < many; i++) changes[i] = slope[unknowns[i]];
+    return 1;
+}
+
 /* --- state -------------------------------------------------------------------------------------------------------- */
 
 typedef struct {

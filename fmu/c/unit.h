@@ -60,6 +60,8 @@ struct Unit {
 static int unit_start(Unit *unit);                              /* take the parameters, compute the outputs at state.time */
 static int unit_step(Unit *unit, double end);                   /* go from state.time to end and set the outputs */
 static int unit_rate(Unit *unit, int reference, double *rate);  /* derivative in time of an output */
+/* How all outputs change with what acted during the last step; `by` has the changes of inputs and tunable parameters. */
+static int unit_slope(Unit *unit, const double *by, double *slope);
 static int unit_read(Unit *unit, int reference);                /* make an output ready that is computed when asked for */
 static void unit_close(Unit *unit);                             /* give back what the operating system must have */
 static int unit_save(Unit *unit, Kept *kept);                   /* what a state holds beside State */

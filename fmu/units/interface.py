@@ -139,6 +139,8 @@ class Interface:
     step_size: float
     output_derivatives: int = 0
     """Highest order of the derivatives of its outputs that the unit gives."""
+    directional_derivatives: bool = False
+    """Whether the unit gives derivatives of its outputs with respect to inputs and tunable parameters."""
     references: dict[str, int] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -70,7 +70,7 @@ def model_description(
             "canNotUseMemoryManagementFunctions": "true",
             "canGetAndSetFMUstate": "true",
             "canSerializeFMUstate": "true",
-            "providesDirectionalDerivative": "false",
+            "providesDirectionalDerivative": boolean(interface.directional_derivatives),
         },
     )
     if source_files:

@@ -19,16 +19,8 @@ import time
 from pathlib import Path
 from typing import IO, Any
 
+from .protocol import PROTOCOL
 from .slave import UnitError
-
-PROTOCOL = 3
-"""Version of the requests and answers; the worker names its own when it starts."""
-
-RECORDED = (
-    *("impact_force_x", "impact_force_y", "top_force", "barrier_velocity", "barrier_displacement"),
-    *("pore_pressure_max", "flow_kinetic_energy"),
-)
-"""Outputs that are quantities of the simulator's time series, by their names there; nil where the scene lacks one."""
 
 INTERPRETER_VARIABLE = "WARP_MPM_PYTHON"
 """Environment variable that names the Python of the worker, above the one recorded when the archive was built."""

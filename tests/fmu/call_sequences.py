@@ -38,7 +38,7 @@ places = st.integers(0, 3)
 call = st.one_of(
     st.tuples(st.just("set_up"), numbers, st.none() | numbers),
     st.tuples(st.just("start")),
-    st.tuples(st.sampled_from(["enter", "leave", "terminate", "reset", "save", "derivatives", "replace"])),
+    st.tuples(st.sampled_from(["enter", "leave", "terminate", "reset", "save", "derivatives", "slopes", "replace"])),
     st.tuples(st.just("step"), st.sampled_from(SIZES)),
     st.tuples(st.just("step"), st.just(0.1)),
     st.tuples(st.just("step_from"), numbers, st.sampled_from(SIZES)),
@@ -137,6 +137,15 @@ class Host:
             size = len(outputs)
             references, orders, values = (c_uint * size)(*outputs), (c_int * size)(*[1] * size), (c_double * size)()
             self.fmu.fmi2GetRealOutputDerivatives(self.fmu.component, references, size, orders, values)
+
+    def slopes(self) -> None:
+        """Directional derivatives of all outputs with respect to all that are numbers and may change between steps."""
+        knowns = [
+            v.valueReference
+            for v in variables
+            if v.type in ("Real", "Float64") and (v.causality == "input" or v.variability == "tunable")
+        ]
+        self.fmu.getDirectionalDerivative(outputs, knowns, [1.0] * len(knowns))
 
     def save(self) -> None:
         self.states.append(self._named("getFMUstate", "getFMUState")())

@@ -20,6 +20,7 @@ from fmpy.validation import validate_fmu
 
 from fmu import archive, c_unit
 from fmu.check import check_archive
+from warp_mpm import Scenario
 
 C_NAMES = [unit.name for unit in c_unit.C_UNITS]
 NAMES = [*(unit.name for unit in archive.PYTHON_UNITS), *C_NAMES]
@@ -194,22 +195,41 @@ def _table(text: str) -> tuple[list[str], list[list[float]]]:
 
 
 def test_reference_of_the_simulator_is_reproduced(tmp_path: Path) -> None:
-    """With a coarse scenario inside; bit for bit on one machine, also from a second build."""
+    """With a coarse scenario inside, in all ways to drive it; bit for bit on one machine."""
     scenario = json.loads(archive.DEFAULT_SCENARIO.read_text())
     scenario["numerics"]["spacing_m"], scenario["output"]["end_time_s"] = 1.0, 1.5
     path = tmp_path / "coarse.json"
     path.write_text(json.dumps(scenario))
     (unit,) = (unit for unit in archive.PYTHON_UNITS if unit.name == "DebrisFlow")
-    simulated = [archive.simulated_reference(path) for _ in range(2)]
-    assert simulated[0] == simulated[1]
-    built = [
-        archive.build_python_unit(unit, tmp_path / str(i), scenario=path, simulated=simulated[i]) for i in range(2)
-    ]
+    simulated = archive.simulated_reference(path)
+    built = [archive.build_python_unit(unit, tmp_path / str(i), scenario=path, simulated=simulated) for i in range(2)]
     assert built[0].read_bytes() == built[1].read_bytes()
     (result,) = (r for r in check_archive(built[0]) if r.name == "reference results")
     assert result.passed, result.detail
     # The unit's own tolerance is for other machines; here only the rounding of the importer's times is left.
-    assert float(result.detail.removeprefix("reproduced to ")) < 1e-9
+    assert float(result.detail.removeprefix("reproduced to ").removesuffix(", driven in 3 ways")) < 1e-9
+    final = {}
+    for way in ("", "_external_force", "_driven"):
+        names, *rows = simulated[f"DebrisFlow{way}_ref.csv"].decode().splitlines()
+        final[way] = dict(zip(names.split(","), rows[-1].split(","), strict=True))
+    moved = {way: float(values['"barrier_displacement"']) for way, values in final.items()}
+    assert moved["_external_force"] < moved[""]
+    # Driven: 4 m/s2 from 0.3 s on in steps of 0.05 s, then 2 m/s for 0.2 s.
+    assert moved["_driven"] == pytest.approx(0.05 * sum(4.0 * 0.05 * n for n in range(10)) + 2.0 * 0.2)
+
+
+def test_tables_beside_a_scenario_come_along(tmp_path: Path) -> None:
+    """A scene whose ground and inflow are files beside it runs from either archive."""
+    path = archive.DEFAULT_SCENARIO.parent / "site_channel.json"
+    for unit in ("DebrisFlow", "DebrisFlowC"):
+        if unit.endswith("C"):
+            (chosen,) = (each for each in c_unit.C_UNITS if each.name == unit)
+            built = c_unit.build_c_unit(chosen, tmp_path, platforms=(c_unit.host_platform(),), scenario=path)
+        else:
+            built = archive.build_python_unit(archive.PYTHON_UNITS[-1], tmp_path, scenario=path)
+        with zipfile.ZipFile(built) as file:
+            inside = Scenario.model_validate(json.loads(file.read("resources/scenario.json")))
+        assert inside.resolved() == Scenario.load(path).resolved()
 
 
 @EACH_PYTHON

@@ -64,6 +64,62 @@ def test_table_has_both() -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "notes"),
+    [
+        (
+            "case_1_mud",
+            [
+                "The material's law, herschel_bulkley, is left out: the closed form knows no strength.",
+                "Calibrated: The formulation undrained is outside the fit, whose flows are two_phase.",
+                "Calibrated: The law herschel_bulkley is outside the fit, whose flows are mohr_coulomb.",
+            ],
+        ),
+        ("case_1_dry", ["Calibrated: The formulation dry is outside the fit, whose flows are two_phase."]),
+        (
+            "site_two_surges",
+            [
+                "Of a flow that arrives the greatest depth and velocity are taken, and all of its volume; several "
+                "surges are taken as one.",
+                "Slope of 6 degrees: the flow's weight along it is left out, 152 kN/m, which pushes on: forces and "
+                "displacements come out too small.",
+            ],
+        ),
+        ("site_two_barriers", ["Further barriers are left out."]),
+        ("hard/overhanging_face", ["No calibrated values: face_angle is 123.69"]),
+    ],
+)
+def test_what_the_closed_form_does_not_see_is_said(name: str, notes: list[str]) -> None:
+    found = json.loads(told(SCENARIOS / f"{name}.json", "--json"))
+    for note in notes:
+        assert any(each.startswith(note) for each in found["notes"]["calibrated"]), found["notes"]
+    text = " ".join(told(SCENARIOS / f"{name}.json").split())
+    assert notes[-1] in text
+    assert ("calibrated" in found) is (name != "hard/overhanging_face")
+
+
+def test_a_parameter_file_comes_with_its_notes() -> None:
+    done = CliRunner().invoke(app, ["parameters", str(SCENARIOS / "case_1_mud.json"), "--ssv"])
+    assert done.exit_code == 0
+    ElementTree.fromstring(done.stdout)
+    assert "The material's law, herschel_bulkley, is left out" in done.stderr
+
+
+def test_a_flow_that_arrives_later(tmp_path: Path) -> None:
+    """Its front is at the section when the table says that something arrives, not at once."""
+    scenario = json.loads((SCENARIOS / "case_1.json").read_text())
+    scenario["flow"].pop("shape", None)
+    scenario["flow"].pop("velocity_m_per_s", None)
+    scenario["flow"]["inflow"] = {
+        "x_m": -20.0, "times_s": [0.0, 3.0, 4.0, 6.0], "depths_m": [0.0, 0.0, 2.0, 1.0], "velocity_m_per_s": 8.0,
+    }  # fmt: skip
+    path = tmp_path / "late.json"
+    path.write_text(json.dumps(scenario))
+    found = json.loads(told(path, "--json"))["paper"]
+    assert found["arrival_time"] == pytest.approx(3.0 + 20.0 / 8.0)
+    assert found["flow_mass"] == pytest.approx(4.0 * 8.0 * found["flow_mass"] / (found["flow_length"] * 2.0))
+
+
+@pytest.mark.parametrize(
     ("arguments", "says"),
     [
         (
@@ -71,6 +127,11 @@ def test_table_has_both() -> None:
             "--variant = mine is not allowed; it must be one of paper,",
         ),
         ([SCENARIOS / "set_iib.json", "--ssv", "--json"], "--ssv and --json are two forms of one output"),
+        (
+            [SCENARIOS / "hard" / "gravity_0.json"],
+            "gravity_0.json: gravity.acceleration_m_per_s2 is 0, the closed form",
+        ),
+        ([SCENARIOS / "hard" / "overhanging_face.json", "--ssv"], "face_angle is 123.69"),
         (["nowhere.json"], "nowhere.json: Cannot read the scenario"),
     ],
 )

@@ -86,6 +86,8 @@ class Sampled(Quantity):
     """Whether a scenario has it."""
     of_points: bool = True
     """Whether it needs all material points: it is then read only where it is asked for."""
+    of_loads: bool = False
+    """Whether it needs where the flow acts on the barrier: it is then read only where it is asked for."""
     mean: bool = False
     """Whether it is a mean over the interval: pictures show its moving mean."""
 

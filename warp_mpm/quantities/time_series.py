@@ -176,19 +176,19 @@ _ROWS = (
         "impact_force_height", "m",
         "height above the barrier's base at which the horizontal force on the impacted face acts; of the mean over the "
         "interval; 0 without force",
-        "height of the impact force", "h_F", there=barrier, of_points=False,
+        "height of the impact force", "h_F", there=barrier, of_points=False, of_loads=True,
         read=lambda now: now.loads.height_of("impact", now.forces["impact"][0]),
     ),
     Sampled(
         "toe_moment", "N m/m",
         "moment of the flow on the whole barrier about its toe; mean over the interval; + turns it downstream",
-        "moment about the toe", "M_toe", read=lambda now: now.loads.toe_moment, there=barrier, of_points=False,
-        mean=True,
+        "moment about the toe", "M_toe", read=lambda now: now.loads.toe_moment, there=barrier,
+        of_points=False, of_loads=True, mean=True,
     ),
     Sampled(
         "heel_moment", "N m/m",
         "moment of the flow on the whole barrier about its heel; mean over the interval; + overturns it",
-        "moment about the heel", "M_heel", there=ended_barrier, of_points=False, mean=True,
+        "moment about the heel", "M_heel", there=ended_barrier, of_points=False, of_loads=True, mean=True,
         read=lambda now: now.loads.heel_moment(sum(now.forces[name][1] for name in ("impact", "top", "back"))),
     ),
     Sampled(
@@ -196,32 +196,32 @@ _ROWS = (
         "greatest mean of the total normal pressure over output.pressure_patch_m of the impacted face and the last "
         "output.pressure_patch_s, or the interval where that is longer",
         "pressure on a patch of the face", "p", read=lambda now: now.loads.pressure_patch.pressure, there=barrier,
-        of_points=False,
+        of_points=False, of_loads=True,
     ),
     Sampled(
         "pressure_patch_height", "m",
         "height above the barrier's base of the middle of the patch of greatest pressure; 0 without pressure",
         "height of the patch of greatest pressure", read=lambda now: now.loads.pressure_patch.height, there=barrier,
-        of_points=False,
+        of_points=False, of_loads=True,
     ),
     Sampled(
         "pore_pressure_patch", "Pa",
         "greatest mean of the liquid's pressure over output.pressure_patch_m of the impacted face and the last "
         "output.pressure_patch_s, or the interval where that is longer",
         "pore pressure on a patch of the face", "p_L", read=lambda now: now.loads.pore_pressure_patch.pressure,
-        there=pressed_by_liquid, of_points=False,
+        there=pressed_by_liquid, of_points=False, of_loads=True,
     ),
     Sampled(
         "pore_pressure_patch_height", "m",
         "height above the barrier's base of the middle of the patch of greatest pore pressure; 0 without pressure",
         "height of the patch of greatest pore pressure", read=lambda now: now.loads.pore_pressure_patch.height,
-        there=pressed_by_liquid, of_points=False,
+        there=pressed_by_liquid, of_points=False, of_loads=True,
     ),
     Sampled(
         "run_up", "m",
         "height above the barrier's base up to which the flow presses on the impacted face with a tenth at least of "
         "rho g h, h its depth at the start; of the mean over the last output.pressure_patch_s",
-        "run-up on the face", "h_r", read=lambda now: now.loads.run_up, there=barrier, of_points=False,
+        "run-up on the face", "h_r", read=lambda now: now.loads.run_up, there=barrier, of_points=False, of_loads=True,
     ),
     Sampled(
         "barrier_velocity", "m/s", "velocity of the barrier along x, v_2", "barrier velocity", "v₂",

@@ -171,7 +171,7 @@ def sampled_quantities(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, 
 def wanted_quantities(known: Mapping[str, Sampled], names: Collection[str] | None) -> list[Sampled]:
     """Those that a sample reads: what is named, or all; and all that cost nothing, so that none of them is ever no
     number unseen."""
-    return [one for key, one in known.items() if names is None or key in names or not one.of_points]
+    return [one for key, one in known.items() if names is None or key in names or not (one.of_points or one.of_loads)]
 
 
 def mean_forces(bodies: Sequence[Body], now: Window, since: Window) -> tuple[dict[str, tuple[float, float]], float]:
