@@ -44,11 +44,19 @@ WORST = {
 """How far a check that falls short may be off today, by words of its quantity; the first that fits counts."""
 
 ALONE = (
-    *("bagnold", "collapse-by-rate", "flume", "heap", "inertial-settling"),
+    *("bagnold", "collapse-by-rate", "dry-column", "flume", "heap", "incline", "inertial-settling"),
     *("pressure-on-a-slope", "saturated-wave", "spreading"),
 )
 """Cases whose kernels hardly another test needs: compiling them takes longer than the case. Their quick variants are
-run with `slow`; `film`, `laws`, `collapse` and `free-settling` stand for their kind."""
+run with `slow`; `film`, `hydrostatic`, `rough-slope`, `collapse` and `free-settling` stand for their kind."""
+
+LONG = {
+    "at-rest": "hydrostatic between walls; tests/hard_cases: flows at rest before a barrier",
+    "dam-break": "bore and sloshing: the same equations of shallow water, another wave",
+    "rotation": "tests/warp_mpm/test_schemes.py: a disc that turns twice",
+    "time-step": "tests/warp_mpm/test_time_step.py, and test_schemes.py: a wave at two lengths of the step",
+}
+"""Cases whose quick variants take ten seconds and are run with `slow`, and what checks their kind more coarsely."""
 
 
 def unexpected(case, quick):
@@ -70,7 +78,7 @@ def tolerated(check):
 
 @pytest.mark.parametrize(
     "case",
-    [pytest.param(c, id=c.name, marks=[pytest.mark.slow] * (c.name in ALONE)) for c in CASES if c.in_quick],
+    [pytest.param(c, id=c.name, marks=[pytest.mark.slow] * (c.name in (*ALONE, *LONG))) for c in CASES if c.in_quick],
 )
 def test_quick(case):
     assert unexpected(case, quick=True) == []

@@ -48,6 +48,11 @@ FIXED = {
 }
 
 
+def with_the_others_slow(table: dict[str, object]) -> list[object]:
+    """Two of the sets by default, from the middle of the bands and from their edge; all of them when slow."""
+    return [pytest.param(name, marks=[pytest.mark.slow] * (name not in ("set_iib", "set_v"))) for name in table]
+
+
 @pytest.fixture(scope="module")
 def compare(archives: dict[str, Path]):
     """Cross-check of a scenario, by its name; simulated once."""
@@ -60,7 +65,7 @@ def compare(archives: dict[str, Path]):
     return run
 
 
-@pytest.mark.parametrize("name", SLIDING)
+@pytest.mark.parametrize("name", with_the_others_slow(SLIDING))
 def test_sliding_barrier_stays_within_the_bands(name: str, compare) -> None:
     found = {comparison.name: comparison for comparison in compare(name).comparisons}
     with_paper, with_calibrated, width = SLIDING[name]
@@ -75,7 +80,7 @@ def test_sliding_barrier_stays_within_the_bands(name: str, compare) -> None:
     assert calibrated.errors["impulse"] == pytest.approx(found["paper"].errors["impulse"], abs=1e-2)
 
 
-@pytest.mark.parametrize("name", SLIDING)
+@pytest.mark.parametrize("name", with_the_others_slow(SLIDING))
 def test_weight_of_the_flow_slows_the_barrier(name: str, compare) -> None:
     """The vertical load that the paper leaves out takes speed from the barrier in every set."""
     found = {comparison.name: comparison for comparison in compare(name).comparisons}
@@ -85,7 +90,7 @@ def test_weight_of_the_flow_slows_the_barrier(name: str, compare) -> None:
     assert loaded < without
 
 
-@pytest.mark.parametrize("name", SLIDING)
+@pytest.mark.parametrize("name", with_the_others_slow(SLIDING))
 def test_unit_under_the_simulated_force_moves_as_the_simulation(name: str, compare) -> None:
     """The barrier's own mechanics: what is left is where in an interval of 5 ms it starts and stops to slide."""
     found = compare(name).comparisons[-1]
@@ -95,7 +100,7 @@ def test_unit_under_the_simulated_force_moves_as_the_simulation(name: str, compa
     assert abs(found.errors["barrier_displacement_final"]) < 1e-3
 
 
-@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.parametrize("name", with_the_others_slow(FIXED))
 def test_fixed_barrier_stays_within_the_bands(name: str, compare) -> None:
     found = {comparison.name: comparison for comparison in compare(f"{name}_fixed").comparisons}
     with_paper, with_calibrated, width = FIXED[name]

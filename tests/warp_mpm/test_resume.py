@@ -57,7 +57,7 @@ def whole(tmp_path_factory):
     """A coarse run of Set IIb that nobody interrupts, its scenario file and its wall time without start and end."""
     folder = tmp_path_factory.mktemp("whole")
     scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(
-        {"numerics.spacing_m": 0.4, "output.end_time_s": 1.5, "output.checkpoint_interval_s": 0.1}
+        {"numerics.spacing_m": 0.5, "output.end_time_s": 1.5, "output.checkpoint_interval_s": 0.1}
     )
     run_scenario(scenario, folder / "run", make_simulation=Simulation)
     return folder / "run", scenario, Results.open(folder / "run").record["wall_time"]
@@ -73,7 +73,7 @@ def go_on(folder, *, in_process):
     assert goes_on.returncode == 0, complaint
 
 
-KILLS = [pytest.param(seed, marks=[pytest.mark.slow] if seed >= 3 else []) for seed in range(20)]
+KILLS = [pytest.param(seed, marks=[pytest.mark.slow] if seed >= 2 else []) for seed in range(20)]
 
 
 @pytest.mark.parametrize("seed", KILLS)
@@ -259,7 +259,7 @@ def test_a_second_run_is_kept_out_of_a_folder_in_use(stopped, coarse_case_1, fly
     assert resume_run(stopped, make_simulation=Meddled).finished
 
 
-@pytest.mark.parametrize("share", [0.02, 0.4])
+@pytest.mark.parametrize("share", [pytest.param(0.02, marks=pytest.mark.slow), 0.4])
 def test_a_full_disk_ends_the_run_in_one_sentence_and_it_goes_on_afterwards(tmp_path, whole, share):
     """A limit on the size of files stands for a full disk; the snapshots meet it at once, or in the middle."""
     reference, _, _ = whole
