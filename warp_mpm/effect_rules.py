@@ -29,7 +29,7 @@ class Rule:
     @property
     def on(self) -> bool:
         """Whether the effect is present."""
-        return self.value not in (False, "none")
+        return self.value not in (False, "none", "constant")
 
 
 def derive_effects(scenario: Scenario) -> Effects:
@@ -49,6 +49,8 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     two_phase = isinstance(flow, TwoPhaseFlow)
     inertial = flow.material.inertial_drag_coefficient if isinstance(flow, TwoPhaseFlow) else 0.0
     porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
+    conductivity = flow.material.conductivity_law if isinstance(flow, TwoPhaseFlow) else "constant"
+    dilatancy = flow.material.dilatancy
     return [
         Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
         Rule("law", LAWS.key(flow.material.law), f"flow.material.law = {flow.material.law}", _another_law(scenario)),
@@ -72,7 +74,23 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             "porosity_update",
             porosity,
             _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
-            {"flow.material.porosity_update": not porosity} if two_phase else {},
+            {"flow.material.porosity_update": not porosity} if two_phase and conductivity == "constant" else {},
+        ),
+        Rule(
+            "conductivity",
+            conductivity,
+            f"flow.material.conductivity_law = {conductivity}" if two_phase else "there are no two phases",
+            {"flow.material.conductivity_law": "kozeny_carman" if conductivity == "constant" else "constant"}
+            if porosity
+            else {},
+        ),
+        Rule(
+            "dilatancy",
+            dilatancy is not None,
+            "flow.material.dilatancy is not given"
+            if dilatancy is None
+            else f"flow.material.dilatancy.coefficient = {dilatancy.coefficient:g}",
+            {"flow.material.dilatancy": None} if dilatancy is not None else {},
         ),
         Rule(
             "arriving",
@@ -231,6 +249,8 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
         "liquid_viscosity_Pa_s",
         "inertial_drag_coefficient",
         "porosity_update",
+        "conductivity_law",
+        "conductivity_scale",
     }
     formulation = "undrained"
     if not isinstance(scenario.flow, TwoPhaseFlow):
@@ -250,6 +270,8 @@ def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
     """
     flow = scenario.resolved()["flow"]
     dropped = {"law", *LAWS.named(scenario.flow.material.law).Settings.model_fields}
+    if not LAWS.named(law).dilates:
+        dropped.add("dilatancy")
     kept = {name: value for name, value in flow["material"].items() if name not in dropped}
     changed = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio}
     return {"flow": flow | changed | {"material": kept | {"law": law, **own}}}
