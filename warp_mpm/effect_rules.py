@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effects import Effects
-from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .scenario import DryFlow, Ground, Scenario, TwoPhaseFlow
 from .simulator.bodies.of_scene import ground_body
 from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
@@ -175,6 +175,10 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
             roughest = max(stretch.friction for stretch in ground.stretches)
             frictions.append((roughest, f"the greatest of ground.stretches is {roughest:g}"))
         rough["ground.friction"], smooth["ground.friction"] = 0.3, 0.0
+    turbulent = ground is not None and any(drag > 0.0 for drag in ground.drags)
+    if turbulent:
+        frictions.append((1.0, "the ground's friction grows with the speed"))
+        smooth["ground.turbulence_m_per_s2"] = None
     rubs = any(friction > 0.0 for friction, _ in frictions)
     moves = any(kind in ("sliding", "prescribed") for kind in kinds.values())
     past = moves and any("top" not in edge for edge in edges)
@@ -195,6 +199,14 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
             rubs,
             ", ".join(why for friction, why in frictions if friction > 0.0 or not rubs) or "nothing solid is there",
             _switch_friction(scenario, smooth if rubs else rough, rubs),
+        ),
+        Rule(
+            "turbulence",
+            turbulent,
+            "there is no ground" if ground is None else _told_turbulence(ground),
+            {"ground.turbulence_m_per_s2": None if turbulent else 500.0}
+            if ground is not None and not ground.stretches
+            else {},
         ),
         Rule("sliding", *why_moves("sliding")),
         Rule("driven", *why_moves("prescribed")),
@@ -220,6 +232,15 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         ),
         Rule("profile", *_many_pieces(scenario)),
     ]
+
+
+def _told_turbulence(ground: Ground) -> str:
+    """Where the ground's friction grows with the speed."""
+    if not any(ground.drags):
+        return "ground.turbulence_m_per_s2 is not given"
+    return "ground.turbulence_m_per_s2 = " + ", ".join(
+        f"{1.0 / drag:g}" for drag in dict.fromkeys(ground.drags) if drag
+    )
 
 
 def _many_pieces(scenario: Scenario) -> tuple[bool, str]:

@@ -51,6 +51,8 @@ class Effects:
     """Something solid is there: ground, walls, a barrier."""
     friction: bool = False
     """Some surface rubs on the flow, so that the effective normal force is needed."""
+    turbulence: bool = False
+    """Some surface rubs with the square of the slip besides (Voellmy)."""
     sliding: bool = False
     """Some body slides on its base: its velocity is found together with the contact."""
     driven: bool = False
@@ -121,6 +123,7 @@ class Effects:
                 "bulk_viscosity",
                 "bodies",
                 "friction",
+                "turbulence",
                 "sliding",
                 "driven",
                 "joined",

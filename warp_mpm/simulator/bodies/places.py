@@ -52,6 +52,8 @@ class Places:
     """[C] of the body's outline."""
     body: NDArray[np.int32]
     """[C]"""
+    length: NDArray[np.float64]
+    """[C] of the surface for which it stands [m]; 0 of nodes further back."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -142,6 +144,7 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
         normal,
         piece.astype(np.int32),
         np.full(len(node), number, dtype=np.int32),
+        np.where(paired, grid.spacing, 0.0),
     )
 
 
@@ -155,11 +158,12 @@ def _points(
     high = low + spacing * np.array([grid.columns, grid.rows])
     reach = float((high - low).sum())
     sideways = not (isinstance(body.motion, Driven) and any(vy for _, vy in body.motion.velocities))
-    position, piece = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)]
+    position, piece, length = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)], [np.zeros(0)]
     for k in np.flatnonzero(wanted):
         start, end = float(pieces.low[k]), float(pieces.high[k])
         if end <= start:
             continue
+        apart = step
         if start <= -ENDLESS and end >= ENDLESS:
             middle = float((0.5 * (low + high) - pieces.begin[k]) @ pieces.along[k])
             s = middle + (np.arange(-math.ceil(reach / step), math.ceil(reach / step)) + 0.5) * step
@@ -169,7 +173,8 @@ def _points(
             s = start + (np.arange(math.ceil(reach / step)) + 0.5) * step
         else:
             count = max(1, math.ceil((end - start) / step - 1e-9))
-            s = start + (np.arange(count) + 0.5) * ((end - start) / count)
+            apart = (end - start) / count
+            s = start + (np.arange(count) + 0.5) * apart
         at = pieces.begin[k] + s[:, None] * pieces.along[k]
         near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
         if passing:
@@ -180,6 +185,7 @@ def _points(
                 near &= other.outline.segments.nearest_within(at, spacing)[0] > -1e-9 * spacing
         position.append(at[near])
         piece.append(np.full(int(near.sum()), k, dtype=np.int32))
+        length.append(np.full(int(near.sum()), apart))
     places, of = np.concatenate(position), np.concatenate(piece)
     count = len(of)
     return Places(
@@ -190,6 +196,7 @@ def _points(
         pieces.normal[of],
         of,
         np.full(count, number, dtype=np.int32),
+        np.concatenate(length),
     )
 
 
