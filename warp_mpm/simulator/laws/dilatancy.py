@@ -37,7 +37,7 @@ class Dilatancy(Model):
     """Diameter δ of the grains, in S alone."""
 
 
-CONSTANTS = ("friction_sine", "dilatancy_coefficient", "critical_solid_fraction", "shear_inertia", "liquid_viscosity")
+CONSTANTS = ("friction_sine", "dilatancy_coefficient", "critical_solid_fraction", "shear_inertia", "fluid_viscosity")
 """Numbers that the function below reads from the parameters."""
 
 
@@ -49,7 +49,7 @@ def numbers(material: Any, law: Law) -> dict[str, float]:
         "dilatancy_coefficient": own.coefficient,
         "critical_solid_fraction": own.critical_solid_fraction,
         "shear_inertia": material.grain_density_kg_per_m3 * own.grain_diameter_m**2,
-        "liquid_viscosity": fluid_viscosity(material),
+        "fluid_viscosity": fluid_viscosity(material),
     }
 
 
@@ -150,7 +150,7 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
         rate = wp.sqrt(stretch * stretch + sheared * sheared)
         m = parameters.grain_share * read(points.reference_volume, p) / volume
         inertia = parameters.shear_inertia * rate * rate
-        viscous = wp.sqrt(parameters.liquid_viscosity * rate)
+        viscous = wp.sqrt(parameters.fluid_viscosity * rate)
         gain = parameters.bulk_modulus * time_step / larger(stiffness, tiny)
         excess = shear - cohesion
         steepest, _none = tangent(m, F(0.0), inertia, viscous, parameters)
