@@ -163,7 +163,9 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         f"domain.{name} = wall" for name in ("left_edge", "right_edge", "top_edge") if getattr(domain, name) == "wall"
     ]
     solid = [*(["ground"] if ground is not None else []), *barriers, *edges]
-    frictions, rough, smooth = [], {}, {}
+    frictions: list[tuple[float, str]] = []
+    rough: dict[str, Any] = {}
+    smooth: dict[str, Any] = {}
     for name, barrier in barriers.items():
         greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
         frictions.append((greatest, f"the greatest of {name}.friction is {greatest:g}"))

@@ -142,7 +142,7 @@ def undrained(quick: bool) -> Outcome:
             compared(
                 f"{name}, {cells} cells: change of the effective pressure",
                 "Pa",
-                effective[-1] - effective[0],
+                float(effective[-1] - effective[0]),
                 change,
                 0.05,
             ),
@@ -200,8 +200,8 @@ CASES = (
     Case(
         name="dilatancy-undrained",
         title="Undrained shear of a loose and a dense layer",
-        tests="A saturated layer of 1 m that its weight and its friction keep shearing at 4 1/s, and that cannot drain: "
-        "looser than the critical solid fraction by 0.01 its pore pressure rises, denser by as much it falls.",
+        tests="A saturated layer of 1 m that its weight and its friction keep shearing at 4 1/s, and that cannot "
+        "drain: looser than the critical solid fraction by 0.01 its pore pressure rises, denser by as much it falls.",
         source="dp'/dt = K tan ψ γ̇', tan ψ = c (m − m_eq), m_eq = m_crit/(1 + √S), with τ = p' sin(φ + ψ) and "
         "γ̇' = γ̇ − τ'/G, integrated at each height (Iverson and George 2014)",
         limit="change of the effective pressure 5 %; rate of the pore pressure 10 %",
@@ -210,8 +210,8 @@ CASES = (
     Case(
         name="dilatancy-drained",
         title="Drained shear of a loose and a dense layer",
-        tests="The same layer dry, 0.05 looser and denser than the critical solid fraction: it shrinks, or swells, toward "
-        "that, and its points move down, or up.",
+        tests="The same layer dry, 0.05 looser and denser than the critical solid fraction: it shrinks, or swells, "
+        "toward that, and its points move down, or up.",
         source="dm/dt = −m tan ψ γ̇ without viscosity: m = m_crit/(1 − (1 − m_crit/m₀) e^(−c m_crit γ))",
         limit="solid fraction 5 % of its distance from m_crit at the start; way of the points 10 %",
         run=drained,
