@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effects import Effects
-from .scenario import DryFlow, Scenario, TwoPhaseFlow
+from .scenario import DryFlow, Ground, Scenario, TwoPhaseFlow
 from .simulator.bodies.of_scene import ground_body
 from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
@@ -29,7 +29,7 @@ class Rule:
     @property
     def on(self) -> bool:
         """Whether the effect is present."""
-        return self.value not in (False, "none")
+        return self.value not in (False, "none", "constant")
 
 
 def derive_effects(scenario: Scenario) -> Effects:
@@ -49,6 +49,8 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     two_phase = isinstance(flow, TwoPhaseFlow)
     inertial = flow.material.inertial_drag_coefficient if isinstance(flow, TwoPhaseFlow) else 0.0
     porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
+    conductivity = flow.material.conductivity_law if isinstance(flow, TwoPhaseFlow) else "constant"
+    dilatancy = flow.material.dilatancy
     return [
         Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
         Rule("law", LAWS.key(flow.material.law), f"flow.material.law = {flow.material.law}", _another_law(scenario)),
@@ -72,7 +74,23 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             "porosity_update",
             porosity,
             _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
-            {"flow.material.porosity_update": not porosity} if two_phase else {},
+            {"flow.material.porosity_update": not porosity} if two_phase and conductivity == "constant" else {},
+        ),
+        Rule(
+            "conductivity",
+            conductivity,
+            f"flow.material.conductivity_law = {conductivity}" if two_phase else "there are no two phases",
+            {"flow.material.conductivity_law": "kozeny_carman" if conductivity == "constant" else "constant"}
+            if porosity
+            else {},
+        ),
+        Rule(
+            "dilatancy",
+            dilatancy is not None,
+            "flow.material.dilatancy is not given"
+            if dilatancy is None
+            else f"flow.material.dilatancy.coefficient = {dilatancy.coefficient:g}",
+            {"flow.material.dilatancy": None} if dilatancy is not None else {},
         ),
         Rule(
             "arriving",
@@ -145,7 +163,9 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         f"domain.{name} = wall" for name in ("left_edge", "right_edge", "top_edge") if getattr(domain, name) == "wall"
     ]
     solid = [*(["ground"] if ground is not None else []), *barriers, *edges]
-    frictions, rough, smooth = [], {}, {}
+    frictions: list[tuple[float, str]] = []
+    rough: dict[str, Any] = {}
+    smooth: dict[str, Any] = {}
     for name, barrier in barriers.items():
         greatest = max(barrier.friction.face, barrier.friction.top, barrier.friction.back)
         frictions.append((greatest, f"the greatest of {name}.friction is {greatest:g}"))
@@ -157,6 +177,10 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
             roughest = max(stretch.friction for stretch in ground.stretches)
             frictions.append((roughest, f"the greatest of ground.stretches is {roughest:g}"))
         rough["ground.friction"], smooth["ground.friction"] = 0.3, 0.0
+    turbulent = ground is not None and any(drag > 0.0 for drag in ground.drags)
+    if turbulent:
+        frictions.append((1.0, "the ground's friction grows with the speed"))
+        smooth["ground.turbulence_m_per_s2"] = None
     rubs = any(friction > 0.0 for friction, _ in frictions)
     moves = any(kind in ("sliding", "prescribed") for kind in kinds.values())
     past = moves and any("top" not in edge for edge in edges)
@@ -177,6 +201,14 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
             rubs,
             ", ".join(why for friction, why in frictions if friction > 0.0 or not rubs) or "nothing solid is there",
             _switch_friction(scenario, smooth if rubs else rough, rubs),
+        ),
+        Rule(
+            "turbulence",
+            turbulent,
+            "there is no ground" if ground is None else _told_turbulence(ground),
+            {"ground.turbulence_m_per_s2": None if turbulent else 500.0}
+            if ground is not None and not ground.stretches
+            else {},
         ),
         Rule("sliding", *why_moves("sliding")),
         Rule("driven", *why_moves("prescribed")),
@@ -202,6 +234,15 @@ def _body_rules(scenario: Scenario) -> list[Rule]:
         ),
         Rule("profile", *_many_pieces(scenario)),
     ]
+
+
+def _told_turbulence(ground: Ground) -> str:
+    """Where the ground's friction grows with the speed."""
+    if not any(ground.drags):
+        return "ground.turbulence_m_per_s2 is not given"
+    return "ground.turbulence_m_per_s2 = " + ", ".join(
+        f"{1.0 / drag:g}" for drag in dict.fromkeys(ground.drags) if drag
+    )
 
 
 def _many_pieces(scenario: Scenario) -> tuple[bool, str]:
@@ -231,6 +272,8 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
         "liquid_viscosity_Pa_s",
         "inertial_drag_coefficient",
         "porosity_update",
+        "conductivity_law",
+        "conductivity_scale",
     }
     formulation = "undrained"
     if not isinstance(scenario.flow, TwoPhaseFlow):
@@ -250,6 +293,8 @@ def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
     """
     flow = scenario.resolved()["flow"]
     dropped = {"law", *LAWS.named(scenario.flow.material.law).Settings.model_fields}
+    if not LAWS.named(law).dilates:
+        dropped.add("dilatancy")
     kept = {name: value for name, value in flow["material"].items() if name not in dropped}
     changed = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio}
     return {"flow": flow | changed | {"material": kept | {"law": law, **own}}}

@@ -43,10 +43,16 @@ class Effects:
     """Drag beyond Darcy's, with the square of the slip; implicit, whatever `drag` is."""
     porosity_update: bool = False
     """Porosity follows the skeleton's volume strain; off: Dn/Dt = 0, Eq. (A11)."""
+    conductivity: Literal["constant", "kozeny_carman", "exponential"] = "constant"
+    """How the conductivity follows the porosity, which is updated; constant: not at all."""
+    dilatancy: bool = False
+    """Sheared, the skeleton swells or shrinks toward a solid fraction of equilibrium."""
     bodies: bool = False
     """Something solid is there: ground, walls, a barrier."""
     friction: bool = False
     """Some surface rubs on the flow, so that the effective normal force is needed."""
+    turbulence: bool = False
+    """Some surface rubs with the square of the slip besides (Voellmy)."""
     sliding: bool = False
     """Some body slides on its base: its velocity is found together with the contact."""
     driven: bool = False
@@ -113,9 +119,11 @@ class Effects:
                 "pressure_relaxation",
                 "inertial_drag",
                 "porosity_update",
+                "dilatancy",
                 "bulk_viscosity",
                 "bodies",
                 "friction",
+                "turbulence",
                 "sliding",
                 "driven",
                 "joined",
@@ -126,6 +134,8 @@ class Effects:
             )
             if getattr(self, name)
         ]
+        if self.conductivity != "constant":
+            flags.append(self.conductivity)
         name = "warp_mpm." + "-".join(flags)
         if len(name) > LONGEST_NAME:  # of a file, with what Warp adds to it
             name = name[: LONGEST_NAME - 17] + "-" + hashlib.sha256(name.encode()).hexdigest()[:16]

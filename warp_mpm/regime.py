@@ -6,6 +6,7 @@ import math
 
 from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, TwoPhaseMaterial, UndrainedMaterial
 from warp_mpm.simulator.laws import LAWS
+from warp_mpm.simulator.laws.dilatancy import equilibrium
 
 GRAIN_DIAMETER = 0.01
 """Of a material whose law asks for none [m]."""
@@ -22,6 +23,9 @@ FRICTION_OVER_VISCOSITY = 2000.0
 FRICTION = 0.6
 """tan φ of rock's grains."""
 
+DENSITY = "m/m_eq"
+"""Name of the solid fraction over that of equilibrium."""
+
 
 def regime(scenario: Scenario) -> dict[str, float]:
     """Dimensionless numbers of a flow as it starts, by name; those that it does not have are left out.
@@ -35,6 +39,7 @@ def regime(scenario: Scenario) -> dict[str, float]:
     - friction = m (ρ_s - ρ_f) g h tan φ / ((1 - m) γ̇ η_f), by weight over that by viscosity, tan φ = 0.6;
     - Stokes = ρ_s d² γ̇ / η_f, inertia of a grain over the liquid's drag on it;
     - drainage = (h² / c_v) / (h / v), time that pore pressure needs to leave over that in which the flow passes itself;
+    - m/m_eq, solid fraction over that at which it would shear for ever, of a skeleton with a dilatancy;
     - and what the law adds, as Bingham = τ_y / (K γ̇^m).
     """
     flow, material = scenario.flow, scenario.flow.material
@@ -67,6 +72,9 @@ def regime(scenario: Scenario) -> dict[str, float]:
         found["drainage"] = depth * speed / coefficient
     if rate > 0.0:
         found |= law.dimensionless(material, rate=rate, pressure=max(0.5 * weight, 0.0))
+        if material.dilatancy is not None:
+            pressure = 0.5 * (1.0 - material.porosity) * max(weight, 0.0)
+            found[DENSITY] = (1.0 - material.porosity) / equilibrium(material, rate=rate, pressure=pressure)
     return found
 
 
@@ -98,8 +106,18 @@ def described_regime(scenario: Scenario) -> str:
     told = ", ".join(f"{name} {_short(value)}" for name, value in numbers.items())
     diameter = LAWS.named(material.law).grain_diameter(material)
     grains = "" if diameter else f", for grains of {1e3 * GRAIN_DIAMETER:g} mm"
-    said = suggestion(scenario)
-    return f"regime: {told}{grains}" + (f"; {said}" if said else "")
+    said = [suggestion(scenario), _density(numbers.get(DENSITY), isinstance(material, UndrainedMaterial))]
+    return "; ".join([f"regime: {told}{grains}", *(one for one in said if one)])
+
+
+def _density(ratio: float | None, wet: bool) -> str:
+    """What m/m_eq says, in a clause."""
+    if ratio is None:
+        return ""
+    loose = ratio < 1.0
+    if not wet:
+        return "loose: it shrinks as it is sheared" if loose else "dense: it swells as it is sheared"
+    return "loose: sheared, its pore pressure rises" if loose else "dense: sheared, its pore pressure falls"
 
 
 def _short(value: float) -> str:

@@ -631,7 +631,7 @@ class Simulation:
             return (1.0 - material.porosity) * stored("reference_volume")
 
         def porosity() -> NDArray[np.float64]:
-            if self.effects.porosity_update:
+            if self.effects.porosity_update or self.effects.dilatancy:
                 return np.maximum(1.0 - grains() / stored("volume"), LEAST_POROSITY)
             return np.full(len(stored("volume")), material.porosity)
 

@@ -65,6 +65,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     LIQUID = effects.liquid
     receive = types.scheme.receive
     FRICTION = effects.friction
+    TURBULENCE = effects.turbulence
     CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     elementary = make_elementary(types)
@@ -290,6 +291,15 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         return result
 
     @wp.func
+    def turbulent(contact: Contact, e: wp.int32, bodies: Bodies, free: F, limit: F, mobility: F, time_step: F) -> F:
+        """Impulse D v² of Voellmy's friction beside Coulomb's, with the slip v at the end of the step, which obeys
+        v = |free| - mobility (limit + D v²); `free` is the slip without any. So no drag bounds the step."""
+        drag = bodies.turbulence[contact.surface[e]] * contact.length[e] * time_step
+        left = wp.max(wp.abs(free) - limit * mobility, F(0.0))
+        slip = F(2.0) * left / (F(1.0) + wp.sqrt(F(1.0) + F(4.0) * drag * mobility * left))
+        return drag * slip * slip
+
+    @wp.func
     def relax(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F):
         """Bring one place's impulses to what the velocities there now call for."""
         inverse = contact.inverse[e]
@@ -330,7 +340,10 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
             liquid_given = (liquid_change / parameters.liquid_ratio) * n
         if FRICTION:
             friction = bodies.friction[contact.surface[e]]
-            if friction > F(0.0):
+            rubs = friction > F(0.0)
+            if TURBULENCE:
+                rubs = rubs or bodies.turbulence[contact.surface[e]] > F(0.0)
+            if rubs:
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     alone_inverse = inverse / parameters.filling_ratio
@@ -349,7 +362,10 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
                     inertia += parameters.liquid_ratio * share
                 slip = wp.dot(solid_velocity, t)
                 old_rub = contact.rubbed[e]
-                new_rub = wp.clamp(old_rub - slip / (inverse / inertia + give_way_along), -limit, limit)
+                mobility = inverse / inertia + give_way_along
+                if TURBULENCE:
+                    limit += turbulent(contact, e, bodies, slip - old_rub * mobility, limit, mobility, time_step)
+                new_rub = wp.clamp(old_rub - slip / mobility, -limit, limit)
                 contact.rubbed[e] = new_rub
                 rub = new_rub - old_rub
                 push -= rub * t

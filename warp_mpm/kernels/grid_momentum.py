@@ -20,6 +20,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     INERTIAL_DRAG = effects.inertial_drag
     POROSITY = effects.porosity_update
+    BEYOND = "drag_beyond" in types.grid_fields
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
 
@@ -36,11 +37,12 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         return result
 
     @wp.func
-    def dragged(free: V, coefficient: F, parameters: Parameters, time_step: F) -> V:
+    def dragged(free: V, coefficient: F, beyond: F, parameters: Parameters, time_step: F) -> V:
         """Exchange momentum between the phases, after their own forces. Per node and direction the two unknowns
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
         Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
-        `coefficient` is Q over its value at the initial porosity, that is n² over its value there.
+        `coefficient` is Q over its value at the initial porosity, that is n² over its value there, and over that of
+        the conductivity where this follows. `beyond` is the same of the drag that follows.
 
         With drag b |w| w besides (Forchheimer), |w| at the end of the step obeys |w| (1 + (rate + b |w|) dt) = |w|
         before."""
@@ -50,7 +52,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         if INERTIAL_DRAG:
             slip_x = free[2] - free[0]
             slip_y = free[3] - free[1]
-            growth = coefficient * wp.sqrt(coefficient) * parameters.inertial_drag_rate * time_step
+            growth = beyond * parameters.inertial_drag_rate * time_step
             growth *= F(4.0) * wp.sqrt(slip_x * slip_x + slip_y * slip_y)
             linear = F(1.0) + lost
             lost += growth / (linear + wp.sqrt(linear * linear + growth)) * F(0.5)
@@ -90,9 +92,14 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if TWO_PHASE:
                         coefficient = F(1.0)
+                        beyond = F(1.0)
                         if POROSITY:
                             coefficient = grid.drag[i, j] / mass
-                        new = dragged(new, coefficient, parameters, time_step)
+                            if INERTIAL_DRAG:
+                                beyond = coefficient * wp.sqrt(coefficient)  # n³
+                        if BEYOND:
+                            beyond = grid.drag_beyond[i, j] / mass
+                        new = dragged(new, coefficient, beyond, parameters, time_step)
                     grid.velocity[i, j] = new
                     keep(grid, i, j, old, new, time_step, parameters)
 

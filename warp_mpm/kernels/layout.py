@@ -16,6 +16,7 @@ import warp as wp
 
 from ..effects import Effects
 from ..simulator.bodies.kernels import PIECE, body_fields, contact_fields
+from ..simulator.laws.dilatancy import CONSTANTS as DILATANCY_CONSTANTS
 
 BLOCK_SHIFT = 3
 BLOCK = 1 << BLOCK_SHIFT
@@ -221,6 +222,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     }
     if effects.porosity_update:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
+        if effects.inertial_drag and effects.conductivity != "constant":
+            grid["drag_beyond"] = array(dtype=scalar, ndim=2)  # the same of the drag with the square of the slip
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it. Contact reads nodes without mass too:
@@ -259,6 +262,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "largest_stable_step_counter": wp.int32,  # which of the counters LIMIT_... tells how often it ruled
     }
     parameters |= dict.fromkeys((*effects.skeleton.constants, *effects.scheme.constants), scalar)
+    if effects.dilatancy:
+        parameters |= dict.fromkeys(DILATANCY_CONSTANTS, scalar)
     if effects.density_correction:
         parameters["density_correction"] = scalar  # share of the crowding undone per unit of shear strain
     if effects.bulk_viscosity:
@@ -282,6 +287,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["liquid_ratio"] = scalar  # mass of liquid over that of the solid
         if effects.inertial_drag:
             parameters["inertial_drag_rate"] = scalar  # the same per speed of the slip, of the drag with its square
+        if effects.conductivity == "exponential":
+            parameters["conductivity_scale"] = scalar  # change of the porosity for a factor of e
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4, P)
     contact = contact_fields(effects, scalar, V2, V3) if effects.bodies else {}

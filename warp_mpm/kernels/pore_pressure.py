@@ -11,11 +11,14 @@ LEAST_POROSITY = 0.01
 
 
 def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
-    """Build the functions `pressure` and `porosity`."""
+    """Build the functions `pressure`, `porosity` and `resistance`."""
     F = types.scalar
     Parameters = types.Parameters
     POROSITY = types.effects.porosity_update
-    larger = make_elementary(types).larger
+    CONDUCTIVITY = types.effects.conductivity
+    elementary = make_elementary(types)
+    larger = elementary.larger
+    exponential = elementary.exponential
 
     @wp.func
     def pressure(strain: F, parameters: Parameters) -> F:
@@ -31,4 +34,16 @@ def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
             result = larger(F(1.0) - (F(1.0) - parameters.porosity) * reference / volume, F(wp.static(LEAST_POROSITY)))
         return result
 
-    return SimpleNamespace(pressure=pressure, porosity=porosity)
+    @wp.func
+    def resistance(n: F, parameters: Parameters) -> F:
+        """1 / permeability at the porosity n, over its value at the start."""
+        result = F(1.0)
+        if wp.static(CONDUCTIVITY == "kozeny_carman"):
+            ratio = parameters.porosity / n
+            share = (F(1.0) - n) / (F(1.0) - parameters.porosity)
+            result = ratio * ratio * ratio * share * share
+        if wp.static(CONDUCTIVITY == "exponential"):
+            result = F(exponential(wp.float64((parameters.porosity - n) / parameters.conductivity_scale)))
+        return result
+
+    return SimpleNamespace(pressure=pressure, porosity=porosity, resistance=resistance)

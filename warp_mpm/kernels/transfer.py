@@ -69,6 +69,9 @@ def make_transfer(
     Bodies = types.Bodies
     Book = types.Book
     POROSITY = effects.porosity_update
+    CONDUCTIVITY = effects.conductivity != "constant"
+    BEYOND = "drag_beyond" in types.grid_fields
+    resistance = pore.resistance
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     pressure_at = pore.pressure
     porosity = pore.porosity
@@ -93,6 +96,8 @@ def make_transfer(
                     grid.liquid_alone[i, j] = V2()
                 if POROSITY:
                     grid.drag[i, j] = F(0.0)
+                    if BEYOND:
+                        grid.drag_beyond[i, j] = F(0.0)
                 if CORNERS:
                     grid.corner[i, j] = S()
 
@@ -165,6 +170,8 @@ def make_transfer(
         liquid_force = F(0.0)
         if TWO_PHASE:
             n = porosity(reference, volume, parameters)
+            if CONDUCTIVITY:
+                resisting = resistance(n, parameters)
             solid_pressure = (F(1.0) - n) * pressure
             liquid_force = volume * n * pressure
         per_cell = parameters.inverse_spacing * force_share(time_step)
@@ -200,9 +207,16 @@ def make_transfer(
                 node = first + k * parameters.rows + m
                 add(grid.mass, node, wy[m] * column_mass)
                 if POROSITY:
-                    # Conductivity is kept, so the coefficient n^2 rho_L g / k goes with n^2.
+                    # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that is not kept.
                     ratio = n / parameters.porosity
-                    add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
+                    if CONDUCTIVITY:
+                        add(grid.drag, node, wy[m] * column_mass * ratio * ratio * resisting)
+                        if BEYOND:
+                            # n^3 rho_L C_F / sqrt(kappa)
+                            beyond = ratio * ratio * ratio * wp.sqrt(resisting)
+                            add(grid.drag_beyond, node, wy[m] * column_mass * beyond)
+                    else:
+                        add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
                 deposit(grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope)
 
         if ALONE_OF_MIXTURE:

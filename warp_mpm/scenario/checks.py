@@ -57,6 +57,12 @@ def problems(scenario: Scenario) -> list[str]:
             f"flow.material.inertial_drag_coefficient = {inertial:g} is not allowed with "
             'numerics.drag = "explicit"; it must be 0, or the drag "semi_implicit"'
         )
+    conductivity = getattr(scenario.flow.material, "conductivity_law", "constant")
+    if scenario.numerics.drag == "explicit" and conductivity != "constant":
+        found.append(
+            f'flow.material.conductivity_law = "{conductivity}" is not allowed with numerics.drag = "explicit"; it '
+            'must be "constant", or the drag "semi_implicit"'
+        )
     flow = scenario.flow
     if flow.initial_pore_pressure_ratio is not None and flow.initial_stress == "zero":
         found.append(

@@ -30,6 +30,7 @@ from warp_mpm.schema import (
     set_fields,
 )
 from warp_mpm.simulator.laws import DEFAULT, LAWS, Law
+from warp_mpm.simulator.laws.dilatancy import Dilatancy
 
 NARROWEST = 1e-6
 """Least width and height [m] of a flow's outline, those of the finest grid's cell."""
@@ -184,6 +185,8 @@ class Skeleton(Model):
     """Young's modulus E' of the drained skeleton."""
     poisson_ratio: Annotated[float, Field(gt=-1.0, lt=0.5)]
     """Poisson's ratio ν of the drained skeleton."""
+    dilatancy: Dilatancy | None = None
+    """How the skeleton swells or shrinks as it is sheared, by its density; null: by the law's constant angle."""
     law: str = DEFAULT
     """How the skeleton answers a strain."""
 
@@ -197,6 +200,20 @@ class Skeleton(Model):
                 f"write {instead} instead"
             )
         return data
+
+    @model_validator(mode="after")
+    def _can_dilate(self) -> Self:
+        if self.dilatancy is None:
+            return self
+        if not LAWS.named(self.law).dilates:
+            able = " or ".join(f'"{law.name}"' for law in LAWS if law.dilates)
+            raise ValueError(f'dilatancy is not allowed with the law "{self.law}"; it must be null, or the law {able}')
+        constant = getattr(self, "dilatancy_angle_deg", 0.0)
+        if constant > 0.0:
+            raise ValueError(
+                f"dilatancy_angle_deg = {constant:g} is not allowed with dilatancy, which tells the angle; it must be 0"
+            )
+        return self
 
     @property
     def solid_partial_density(self) -> float:
@@ -270,11 +287,25 @@ class TwoPhaseMaterial(UndrainedMaterial):
     is none, 1.75 / √(150 n³) Ergun's for a bed of grains."""
     porosity_update: bool = False
     """True updates the porosity with the skeleton's volume strain; False keeps it, as the paper does (Eq. (A11))."""
+    conductivity_law: Literal["constant", "kozeny_carman", "exponential"] = "constant"
+    """How the conductivity follows the porosity n, which porosity_update must update: kozeny_carman by n³/(1 - n)²,
+    exponential by e^((n - n_0)/conductivity_scale)."""
+    conductivity_scale: Annotated[float, Field(ge=0.005, le=1.0)] = 0.04
+    """Change of the porosity by which the exponential conductivity changes by a factor of e."""
 
     @model_validator(mode="after")
     def _one_conductivity(self) -> Self:
         if (self.hydraulic_conductivity_m_per_s is None) == (self.intrinsic_permeability_m2 is None):
             raise ValueError("needs exactly one of hydraulic_conductivity_m_per_s and intrinsic_permeability_m2")
+        return self
+
+    @model_validator(mode="after")
+    def _porosity_is_followed(self) -> Self:
+        if self.conductivity_law != "constant" and not self.porosity_update:
+            raise ValueError(
+                f'conductivity_law = "{self.conductivity_law}" is not allowed with porosity_update = false; it must be '
+                '"constant", or porosity_update true'
+            )
         return self
 
     @property

@@ -28,6 +28,9 @@ FARTHEST = 1e6
 """Greatest coordinate [m], as of every other one in a scenario."""
 
 
+Turbulence = Annotated[float, Field(ge=1.0, le=1e6)]
+
+
 class Stretch(Model):
     """Ground from a place on, with its own friction."""
 
@@ -35,6 +38,8 @@ class Stretch(Model):
     """x in the profile from which on the friction holds, up to where the next stretch begins."""
     friction: Friction
     """Friction coefficient tan φ_b between the flow's solid and the ground."""
+    turbulence_m_per_s2: Turbulence | None = None
+    """Voellmy's ξ there; null: that of the ground."""
 
 
 class Ground(Model):
@@ -42,6 +47,9 @@ class Ground(Model):
 
     friction: Friction = 0.0
     """Friction coefficient tan φ_b between the flow's solid and the ground; 0 is smooth, as in the paper."""
+    turbulence_m_per_s2: Turbulence | None = None
+    """Voellmy's ξ: the ground rubs on the flow with ρ g v²/ξ besides, ρ the flow's density at the start; null: with
+    friction alone."""
     profile_m: Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=MOST_POINTS)] | None = None
     """Points [x, y] of the ground's surface, x not decreasing: two of one x are an upright step. Beyond its ends the
     ground goes on straight, and a fitted domain ends there. null: level, y = 0."""
@@ -145,6 +153,13 @@ class Ground(Model):
         """Where each stretch begins [m], from the scene's origin, the first one at -inf, and its friction."""
         begin = float(self._origin[0])
         return [(-math.inf, self.friction)] + [(stretch.from_m - begin, stretch.friction) for stretch in self.stretches]
+
+    @property
+    def drags(self) -> list[float]:
+        """1 / ξ [s²/m] of each of `frictions`; 0 where the friction does not grow with the speed."""
+        given = [self.turbulence_m_per_s2]
+        given += [stretch.turbulence_m_per_s2 or self.turbulence_m_per_s2 for stretch in self.stretches]
+        return [0.0 if one is None else 1.0 / one for one in given]
 
     @property
     def roughest(self) -> float:

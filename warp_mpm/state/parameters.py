@@ -14,6 +14,7 @@ from ..scenario import STANDARD_GRAVITY, Scenario, Skeleton, Trapezoid
 from ..simulator.bodies import Body
 from ..simulator.bodies.of_scene import BARRIER
 from ..simulator.bodies.outline import ENDLESS
+from ..simulator.laws import dilatancy
 from ..time_step import StepLimits, moving_density
 
 
@@ -97,6 +98,8 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits, material
         "bulk_modulus": material.bulk_modulus,
         "grain_share": 1.0 - material.porosity,
     } | effects.skeleton.numbers(material)
+    if effects.dilatancy:
+        values |= dilatancy.numbers(material, effects.skeleton)
     if effects.density_correction:
         values["density_correction"] = numerics.density_correction
     if effects.bulk_viscosity:
@@ -124,6 +127,8 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
             "drag_per_mass": coefficient / solid,
             "drag_rate": coefficient * (1.0 / solid + 1.0 / liquid),
         }
+        if effects.conductivity == "exponential":
+            values["conductivity_scale"] = material.conductivity_scale
         if effects.inertial_drag:
             per_volume = n**3 * material.liquid_density_kg_per_m3 * material.inertial_drag_coefficient
             per_volume /= math.sqrt(material.intrinsic_permeability)

@@ -92,6 +92,7 @@ def effects_of(bodies: Sequence[Body]) -> dict[str, bool]:
     return {
         "bodies": len(bodies) > 0,
         "friction": any(body.rubs for body in bodies),
+        "turbulence": any(body.turbulent for body in bodies),
         "sliding": any(isinstance(body.motion, Sliding) for body in bodies),
         "driven": any(isinstance(body.motion, Driven) for body in bodies),
         "joined": len(bodies) > 0 and not ground_alone,
@@ -136,6 +137,8 @@ def body_arrays(
     if effects.friction:
         given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
         given["rubs"] = np.array([body.rubs for body in bodies], dtype=np.int32)
+    if effects.turbulence:
+        given["turbulence"] = np.array([surface.turbulence for body in bodies for surface in body.surfaces])
     if effects.moving:
         given["carrier"] = carrier(bodies)
     if effects.sliding:
@@ -213,6 +216,8 @@ def contact_arrays(
             name: np.concatenate([own, len(alone) + rank[beside[order]]]).astype(np.int32)
             for name, beside in (("before", before), ("after", after))
         }
+    if effects.turbulence:
+        given["length"] = places.length
     given["slot"] = np.full(len(places), -1, dtype=np.int32)
     if slots is not None:
         given["slot"], given["share"] = slots.shares(places, grid.spacing)

@@ -20,12 +20,16 @@ class Surface:
     """Friction coefficient tan δ between the flow's solid and the surface; 0 is smooth."""
     pieces: tuple[int, ...] | None = None
     """Which pieces of the outline: piece k runs from vertex k of `Outline.vertices`. None: all of them."""
+    turbulence: float = 0.0
+    """Shear stress beside the friction, over the square of the slip [kg/m³]: ρ g / ξ of Voellmy's; 0 is none."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise ValueError(f"name = {self.name!r} is not allowed; it must be small letters, digits and _")
         if not 0.0 <= self.friction <= 10.0:
             raise ValueError(f"friction = {self.friction:g} of {self.name} must be from 0 to 10")
+        if not 0.0 <= self.turbulence < math.inf:
+            raise ValueError(f"turbulence = {self.turbulence:g} of {self.name} must be at least 0 and finite")
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,12 @@ class Body:
     @property
     def rubs(self) -> bool:
         """Whether any of its surfaces has friction."""
-        return any(surface.friction > 0.0 for surface in self.surfaces)
+        return any(surface.friction > 0.0 for surface in self.surfaces) or self.turbulent
+
+    @property
+    def turbulent(self) -> bool:
+        """Whether any of them has a friction that grows with the square of the slip."""
+        return any(surface.turbulence > 0.0 for surface in self.surfaces)
 
     @property
     def moves(self) -> bool:

@@ -47,6 +47,8 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
     if effects.friction:
         fields["friction"] = array(dtype=scalar)  # [S]
         fields["rubs"] = array(dtype=wp.int32)  # [B] 1: some surface of the body has friction
+    if effects.turbulence:
+        fields["turbulence"] = array(dtype=scalar)  # [S] shear stress over the square of the slip [kg/m3]
     if effects.moving:
         fields |= {
             "carrier": wp.int32,  # the body with which the grid rides; -1: the grid rests
@@ -112,6 +114,8 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
         }
     if effects.two_phase:
         fields["liquid"] = array(dtype=scalar)  # on the liquid,
+    if effects.turbulence:
+        fields["length"] = array(dtype=scalar)  # of the surface for which a place stands [m]
     if effects.friction:
         # Neighbours along the piece, or the place itself.
         fields["before"] = array(dtype=wp.int32)

@@ -26,15 +26,22 @@ def scene_bodies(scenario: Scenario, grid: GridLayout) -> list[Body]:
     """Ground, side walls, ceiling and barriers of `scenario`, those that it has."""
     bodies = []
     if scenario.ground is not None:
-        bodies.append(ground_body(scenario.ground))
+        weight = scenario.flow.material.density * scenario.gravity.acceleration_m_per_s2
+        bodies.append(ground_body(scenario.ground, weight))
     bodies += _edges(scenario, grid)
     return bodies + barrier_bodies(scenario)
 
 
-def ground_body(ground: Ground) -> Body:
-    """The ground, with a surface for each stretch: `ground`, or `ground_1` and so on where there are several."""
+def ground_body(ground: Ground, weight: float = 0.0) -> Body:
+    """The ground, with a surface for each stretch: `ground`, or `ground_1` and so on where there are several.
+
+    Args:
+        ground: of the scene.
+        weight: ρ g of the flow [N/m³], for the part of Voellmy's friction that grows with the speed.
+    """
     if ground.level:
-        return Body(GROUND, Outline(ground.profile, closed=False), (Surface(GROUND, ground.friction),))
+        alone = Surface(GROUND, ground.friction, turbulence=weight * ground.drags[0])
+        return Body(GROUND, Outline(ground.profile, closed=False), (alone,))
     vertices = ground.profile
     begins = [begin for begin, _ in ground.frictions[1:]]
     for begin in begins:
@@ -46,8 +53,8 @@ def ground_body(ground: Ground) -> Body:
     stretch = np.searchsorted(begins, middle, side="right")
     names = [f"{GROUND}_{number + 1}" for number in range(len(begins) + 1)] if begins else [GROUND]
     surfaces = [
-        Surface(name, friction, tuple(int(piece) for piece in np.flatnonzero(stretch == number)))
-        for number, (name, (_, friction)) in enumerate(zip(names, ground.frictions, strict=True))
+        Surface(name, friction, tuple(int(piece) for piece in np.flatnonzero(stretch == number)), weight * drag)
+        for number, (name, (_, friction), drag) in enumerate(zip(names, ground.frictions, ground.drags, strict=True))
     ]
     return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces))
 

@@ -52,6 +52,8 @@ class Places:
     """[C] of the body's outline."""
     body: NDArray[np.int32]
     """[C]"""
+    length: NDArray[np.float64]
+    """[C] of the surface for which it stands [m]; 0 of nodes further back."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -142,6 +144,7 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
         normal,
         piece.astype(np.int32),
         np.full(len(node), number, dtype=np.int32),
+        np.where(paired, grid.spacing, 0.0),
     )
 
 
@@ -155,7 +158,7 @@ def _points(
     high = low + spacing * np.array([grid.columns, grid.rows])
     reach = float((high - low).sum())
     sideways = not (isinstance(body.motion, Driven) and any(vy for _, vy in body.motion.velocities))
-    position, piece = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)]
+    position, piece, length = [np.zeros((0, 2))], [np.zeros(0, dtype=np.int32)], [np.zeros(0)]
     for k in np.flatnonzero(wanted):
         middle = float((0.5 * (low + high) - pieces.begin[k]) @ pieces.along[k])
         window = (middle - reach, middle + reach)
@@ -163,7 +166,7 @@ def _points(
         if not passing and others:
             stretches = _free_stretches(pieces.begin[k], pieces.along[k], stretches[0], window, grid, others)
         for stretch in stretches:
-            s = _laid(stretch, window, step)
+            s, apart = _laid(stretch, window, step)
             at = pieces.begin[k] + s[:, None] * pieces.along[k]
             near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
             if passing:
@@ -171,6 +174,7 @@ def _points(
                 near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
             position.append(at[near])
             piece.append(np.full(int(near.sum()), k, dtype=np.int32))
+            length.append(np.full(int(near.sum()), apart))
     places, of = np.concatenate(position), np.concatenate(piece)
     count = len(of)
     return Places(
@@ -181,22 +185,24 @@ def _points(
         pieces.normal[of],
         of,
         np.full(count, number, dtype=np.int32),
+        np.concatenate(length),
     )
 
 
-def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> NDArray[Any]:
-    """Places along a piece, a step apart, the first and last half a step from its ends; within the window where it has
-    none."""
+def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> tuple[NDArray[Any], float]:
+    """Places along a piece, and how far apart: a step, the first and last half of that from its ends; within the window
+    where it has none."""
     start, end = stretch
     begins, stops = start > -ENDLESS, end < ENDLESS
     length = (end if stops else window[1]) - (start if begins else window[0])
     if length <= 0.0:
-        return np.zeros(0)
+        return np.zeros(0), step
     count = max(1, math.ceil(length / step - 1e-9))
-    places: NDArray[Any] = (np.arange(count) + 0.5) * (length / count if begins and stops else step)
+    apart = length / count if begins and stops else step
+    places: NDArray[Any] = (np.arange(count) + 0.5) * apart
     if begins:
-        return start + places
-    return (end - places)[::-1] if stops else window[0] + places
+        return start + places, apart
+    return ((end - places)[::-1] if stops else window[0] + places), apart
 
 
 def _free_stretches(

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from .dilatancy import angle_at_rest, greatest_angle, make_dilatancy
 from .law import Array, Law
 from .mohr_coulomb import Settings as OfMohrCoulomb
 from .radial import TINY, lateral_range, make_radial, mean_and_shear, slow_stress
@@ -31,6 +32,7 @@ class CoulombViscous(Law):
     title = "Coulomb friction (a cone that is Mohr–Coulomb in plane flow) and a viscosity of the mixture"
     Settings = Settings
     opens = True
+    dilates = True
     constants = ("cone_strength", "cone_slope", "dilation", "mixture_viscosity", "tension_limit")
 
     def numbers(self, material: Any) -> dict[str, float]:
@@ -46,13 +48,18 @@ class CoulombViscous(Law):
     def bears_tension(self, material: Any) -> bool:
         return material.tension_cutoff_Pa > 0.0 and material.cohesion_Pa > 0.0
 
+    def friction(self, material: Any) -> float:
+        return math.tan(math.radians(material.friction_angle_deg))
+
     def lateral_stress_ratio(self, material: Any) -> float:
         """Jaky's 1 - sin φ', or what the cone allows."""
-        _, slope = _cone(material)
+        slope = math.sin(angle_at_rest(material, math.radians(material.friction_angle_deg)))
         return max(1.0 - slope, lateral_range(1.0, 0.0, slope)[0])
 
     def lateral_stress_range(self, material: Any, vertical: float) -> tuple[float, float]:
-        return lateral_range(vertical, *_cone(material))
+        strength, _ = _cone(material)
+        slope = math.sin(angle_at_rest(material, math.radians(material.friction_angle_deg)))
+        return lateral_range(vertical, strength, slope)
 
     def caveats(self, material: Any) -> list[str]:
         return slow_stress(material.mixture_viscosity_Pa_s, material, "mixture_viscosity_Pa_s")
@@ -77,7 +84,8 @@ class CoulombViscous(Law):
         beyond = mean - _largest_tension(material)
         if material.mixture_viscosity_Pa_s > 0.0:
             return beyond
-        strength, slope = _cone(material)
+        strength, _ = _cone(material)
+        slope = math.sin(greatest_angle(material, math.radians(material.friction_angle_deg)))
         return beyond.clip(min=shear - strength + slope * mean)
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
@@ -87,6 +95,8 @@ class CoulombViscous(Law):
         larger, smaller = tools.larger, tools.smaller
         radial = make_radial(types)
         parted, joined = radial.parted, radial.joined
+        DILATANCY = types.effects.dilatancy
+        swollen = make_dilatancy(types, tools).dilated if DILATANCY else None
 
         @wp.func
         def back(
@@ -96,10 +106,20 @@ class CoulombViscous(Law):
             # Sheared at the rate γ̇ the pressure grows by K sin ψ γ̇ Δt, and with it the friction; then the cut-off.
             pushed = parameters.bulk_modulus * parameters.dilation * time_step
             stiffness = parameters.mixture_viscosity + parameters.shear_modulus * time_step
-            excess = larger(shear - parameters.cone_strength + parameters.cone_slope * mean, F(0.0))
-            dilated = mean - pushed * excess / (stiffness + parameters.cone_slope * pushed)
-            borne = smaller(dilated, parameters.tension_limit)
-            static = parameters.cone_strength - parameters.cone_slope * borne
+            slope = parameters.cone_slope
+            limit = parameters.tension_limit
+            if DILATANCY:
+                strength = parameters.cone_strength
+                pressure, slope = swollen(
+                    points, p, -mean, shear, strength, stiffness, gradient, volume, time_step, parameters
+                )
+                dilated = -pressure
+                limit = smaller(limit, strength / larger(slope, F(1.0e-6)))
+            else:
+                excess = larger(shear - parameters.cone_strength + slope * mean, F(0.0))
+                dilated = mean - pushed * excess / (stiffness + slope * pushed)
+            borne = smaller(dilated, limit)
+            static = parameters.cone_strength - slope * borne
             rate = larger(shear - static, F(0.0)) / stiffness
             share = (smaller(shear, static) + parameters.mixture_viscosity * rate) / larger(shear, F(wp.static(TINY)))
             return joined(stress, mean, borne, share), (dilated - borne) / parameters.bulk_modulus

@@ -37,6 +37,8 @@ class Law:
     """Whether the skeleton may open: the gap is then followed, and must close before the skeleton bears again."""
     extra_stress: ClassVar[bool] = False
     """Whether there is a stress beside the one that is remembered, such as a viscous one."""
+    dilates: ClassVar[bool] = False
+    """Whether its skeleton takes `flow.material.dilatancy` (`dilatancy.make_dilatancy`)."""
     vectorised: ClassVar[bool] = True
     """Whether `back` is free of branches and calls, so that it stands in `update`; else it gets a kernel of its own."""
 
@@ -59,6 +61,10 @@ class Law:
             density: mass that moves with the solid, per volume of the whole [kg/m³].
         """
         return math.inf
+
+    def friction(self, material: Any) -> float:
+        """tan φ of its friction at rest, which dilatancy adds to; of a law that `dilates`."""
+        return 0.0
 
     def lateral_stress_ratio(self, material: Any) -> float:
         """Horizontal over vertical effective stress at rest, K0 [-]; by default that of an elastic layer."""

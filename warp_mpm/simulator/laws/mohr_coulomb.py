@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from warp_mpm.schema import Model, NonNegative
 
+from .dilatancy import angle_at_rest, greatest_angle, make_dilatancy
 from .law import Array, Law
 
 
@@ -41,6 +42,7 @@ class MohrCoulomb(Law):
     title = "non-associative Mohr–Coulomb with a tension cut-off (the paper's)"
     Settings = Settings
     opens = True
+    dilates = True
     constants = (
         "yield_plus",
         "yield_minus",
@@ -71,15 +73,18 @@ class MohrCoulomb(Law):
     def bears_tension(self, material: Any) -> bool:
         return material.tension_cutoff_Pa > 0.0 and material.cohesion_Pa > 0.0
 
+    def friction(self, material: Any) -> float:
+        return math.tan(math.radians(material.friction_angle_deg))
+
     def lateral_stress_ratio(self, material: Any) -> float:
         """Jaky's 1 - sin φ'."""
-        return 1.0 - math.sin(math.radians(material.friction_angle_deg))
+        return 1.0 - math.sin(angle_at_rest(material, math.radians(material.friction_angle_deg)))
 
     def lateral_stress_range(self, material: Any, vertical: float) -> tuple[float, float]:
         """Active and passive coefficients of Rankine, with cohesion."""
         if vertical == 0.0:
             return 0.0, math.inf
-        sine = math.sin(math.radians(material.friction_angle_deg))
+        sine = math.sin(angle_at_rest(material, math.radians(material.friction_angle_deg)))
         cohesion = 2.0 * material.cohesion_Pa * math.cos(math.radians(material.friction_angle_deg))
         least = max(((1.0 - sine) * vertical - cohesion) / ((1.0 + sine) * vertical), 0.0)
         return least, ((1.0 + sine) * vertical + cohesion) / ((1.0 - sine) * vertical)
@@ -93,7 +98,7 @@ class MohrCoulomb(Law):
         principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
         first, last = principal[2], principal[0]
         angle = math.radians(material.friction_angle_deg)
-        sine, cosine = math.sin(angle), math.cos(angle)
+        sine, cosine = math.sin(greatest_angle(material, angle)), math.cos(angle)
         cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
         apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
         return np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
@@ -102,6 +107,8 @@ class MohrCoulomb(Law):
         import warp as wp
 
         F, V4, Points, Parameters = types.scalar, types.V4, types.Points, types.Parameters
+        if types.effects.dilatancy:
+            return {"back": _make_dilatant(types, tools)}
         return_mapping = make_return_mapping(types, tools)
 
         @wp.func
@@ -113,7 +120,68 @@ class MohrCoulomb(Law):
         return {"back": back}
 
 
-def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
+def _make_dilatant(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
+    """Build `back` with an angle of friction that is each point's own: first the pressure, with what dilatancy adds to
+    it, then the way back at that pressure, without a change of volume."""
+    import warp as wp
+
+    F, V4, Points, Parameters = types.scalar, types.V4, types.Points, types.Parameters
+    larger, smaller = tools.larger, tools.smaller
+    fields = ("lame", "shear_modulus", "bulk_modulus", *MohrCoulomb.constants)
+    Cone = wp.struct(type("Cone", (), {"__annotations__": dict.fromkeys(fields, F), "__module__": __name__}))
+    dilated = make_dilatancy(types, tools).dilated
+    return_mapping = make_return_mapping(types, tools, Cone)
+
+    @wp.func
+    def back(points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters):
+        centre = F(0.5) * (stress[0] + stress[1])
+        difference = F(0.5) * (stress[0] - stress[1])
+        radius = wp.sqrt(difference * difference + stress[3] * stress[3])
+        first = larger(centre + radius, stress[2])
+        last = smaller(centre - radius, stress[2])
+        pressure = F(-0.5) * (first + last)
+        g = parameters.shear_modulus
+        after, sine = dilated(
+            points,
+            p,
+            pressure,
+            F(0.5) * (first - last),
+            F(0.5) * parameters.cohesion_term,
+            g * time_step,
+            gradient,
+            volume,
+            time_step,
+            parameters,
+        )
+        push = pressure - after
+        # As `yield_constants` has them, with ψ = 0.
+        y = Cone()
+        y.lame = parameters.lame
+        y.shear_modulus = g
+        y.bulk_modulus = parameters.bulk_modulus
+        y.yield_plus = F(1.0) + sine
+        y.yield_minus = F(1.0) - sine
+        y.cohesion_term = parameters.cohesion_term
+        apex = F(0.5) * parameters.cohesion_term / larger(sine, F(1.0e-6))
+        y.tension_limit = smaller(parameters.tension_limit, apex)
+        y.plane_inverse = F(0.25) / g
+        upper = F(1.0) / (g * (F(1.0) + sine) * (F(3.0) - sine))
+        lower = F(1.0) / (g * (F(1.0) - sine) * (F(3.0) + sine))
+        y.upper_own = upper
+        y.upper_ratio = F(0.5) * (F(1.0) - sine)
+        y.upper_cross = upper * y.upper_ratio
+        y.lower_own = lower
+        y.lower_ratio = F(0.5) * (F(1.0) + sine)
+        y.lower_cross = lower * y.lower_ratio
+        y.flow_up = F(2.0) * g
+        y.flow_side = F(0.0)
+        y.flow_down = F(-2.0) * g
+        return return_mapping(V4(stress[0] + push, stress[1] + push, stress[2] + push, stress[3]), y)
+
+    return back
+
+
+def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace, constants: Any = None) -> Any:
     """Build the Warp function that maps a trial stress back onto the yield surface.
 
     Perfect plasticity with linear elasticity, so every region of the surface has a closed form (Clausen et al. 2007,
@@ -125,9 +193,9 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
     where T is at most the apex c cot phi, so that the apex of the cone is the apex of the cut-off. Regions: plane, two
     edges, one, two or three tension planes, cone and cut-off together with their two corners.
 
-    The function takes the trial stress (xx, yy, zz, xy) [Pa] and `parameters`, whose fields `yield_constants` makes; it
-    returns the stress on or inside the surface and the opening, the plastic volume strain due to the cut-off alone,
-    over the volume after it [-].
+    The function takes the trial stress (xx, yy, zz, xy) [Pa] and the parameters, or another structure `constants`,
+    whose fields `yield_constants` makes; it returns the stress on or inside the surface and the opening, the plastic
+    volume strain due to the cut-off alone, over the volume after it [-].
     Where most points yield, branches cost more than arithmetic: the cone is free of them.
     """
     import warp as wp
@@ -135,11 +203,11 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
     F = types.scalar
     V3 = types.V3
     V4 = types.V4
-    Parameters = types.Parameters
+    Constants = constants or types.Parameters
     larger, smaller = tools.larger, tools.smaller
 
     @wp.func
-    def cone(s: V3, y: Parameters) -> V3:
+    def cone(s: V3, y: Constants) -> V3:
         f = larger(y.yield_plus * s[0] - y.yield_minus * s[2] - y.cohesion_term, F(0.0))
         upper = y.yield_plus * s[1] - y.yield_minus * s[2] - y.cohesion_term
         lower = y.yield_plus * s[0] - y.yield_minus * s[1] - y.cohesion_term
@@ -154,7 +222,7 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
         )
 
     @wp.func
-    def cut_off(s: V3, y: Parameters) -> V3:
+    def cut_off(s: V3, y: Constants) -> V3:
         stiff = y.lame + F(2.0) * y.shear_modulus
         limit = y.tension_limit
         excess = (s[0] - limit) / stiff
@@ -172,7 +240,7 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
         return r
 
     @wp.func
-    def return_mapping(stress: V4, y: Parameters):
+    def return_mapping(stress: V4, y: Constants):
         half = F(0.5)
         mean = half * (stress[0] + stress[1])
         difference = half * (stress[0] - stress[1])
