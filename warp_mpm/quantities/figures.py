@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from analytic.force_record import END_SHARE, FILTER_WINDOW, RESIDUAL_SHARE, SETTLED_SHARE, START_SHARE
 
-from .quantity import Quantity
+from .quantity import FORCE, IMPULSE, MOMENT, VOLUME, Quantity
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Figure(Quantity):
         return f"{self.short or self.symbol or self.words} [{self.shown_unit}]"
 
 
-FORCE = ("impact_force_x",)
+ON_FACE = ("impact_force_x",)
 
 PATCH = (
     "output.pressure_patch_m of the face and output.pressure_patch_s (0.5 m and 20 ms unless given), or over a cell "
@@ -34,30 +34,30 @@ PATCH = (
 
 _ROWS = (
     Figure(
-        "peak_force", "N/m",
+        "peak_force", FORCE,
         "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
         "its time is the end of that interval; where force_still_rises, that so far, at least",
-        "peak force", needs=FORCE,
+        "peak force", needs=ON_FACE,
     ),
     Figure("peak_force_time", "s", "end of the interval of peak_force", "time of the peak"),
     Figure(
-        "peak_force_filtered", "N/m", f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
-        f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=FORCE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
+        "peak_force_filtered", FORCE, f"the same of the force's moving mean over {FILTER_WINDOW:g} s",
+        f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=ON_FACE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
     ),
     Figure(
         "force_still_rises", "-", "whether that moving mean is greatest where the run ends; null without an impact",
     ),
     Figure(
         "impact_start_time", "s", f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
-        "impact from", needs=FORCE,
+        "impact from", needs=ON_FACE,
     ),
     Figure(
         "rise_time", "s", "T1: peak_force_filtered_time less impact_start_time; null where force_still_rises",
-        "rise time", "T₁", needs=FORCE,
+        "rise time", "T₁", needs=ON_FACE,
     ),
     Figure(
-        "residual_force", "N/m", f"mean force over the last {RESIDUAL_SHARE:.0%} of the run", "residual force",
-        needs=FORCE,
+        "residual_force", FORCE, f"mean force over the last {RESIDUAL_SHARE:.0%} of the run", "residual force",
+        needs=ON_FACE,
     ),
     Figure(
         "impact_end_time", "s",
@@ -68,15 +68,15 @@ _ROWS = (
         f"{END_SHARE:.0%} of that peak in as long as the impact has lasted",
     ),
     Figure(
-        "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=FORCE,
+        "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=ON_FACE,
     ),
     Figure(
-        "impulse", "N s/m", "time integral of the horizontal force on the impacted face over the whole run",
-        "impulse", needs=FORCE,
+        "impulse", IMPULSE, "time integral of the horizontal force on the impacted face over the whole run",
+        "impulse", needs=ON_FACE,
     ),
     Figure(
-        "impact_impulse", "N s/m", "the same from impact_start_time to impact_end_time", "impulse until T₂",
-        needs=FORCE,
+        "impact_impulse", IMPULSE, "the same from impact_start_time to impact_end_time", "impulse until T₂",
+        needs=ON_FACE,
     ),
     Figure(
         "barrier_velocity_max", "m/s", "greatest velocity downstream; 0 of a barrier that only slides upstream",
@@ -97,15 +97,15 @@ _ROWS = (
         "peak_force_height", "m",
         "height above the barrier's base at which the horizontal force on the impacted face acts at "
         "peak_force_filtered_time, of its moving mean",
-        "height of the peak force", "h_F", needs=(*FORCE, "impact_force_height"),
+        "height of the peak force", "h_F", needs=(*ON_FACE, "impact_force_height"),
     ),
     Figure(
-        "toe_moment_filtered", "N m/m",
+        "toe_moment_filtered", MOMENT,
         f"greatest moment of the flow on the barrier about its toe, of the moving mean over {FILTER_WINDOW:g} s",
         f"greatest moment about the toe, {FILTER_WINDOW:g} s mean", "M_toe", needs=("toe_moment",),
     ),
     Figure(
-        "heel_moment_filtered", "N m/m",
+        "heel_moment_filtered", MOMENT,
         f"greatest moment of the flow that overturns the barrier about its heel, of the moving mean over "
         f"{FILTER_WINDOW:g} s; its own weight is not counted; null of a wall, which has no heel",
         f"greatest moment about the heel, {FILTER_WINDOW:g} s mean", "M_heel", needs=("heel_moment",),
@@ -156,23 +156,23 @@ _ROWS = (
         "greatest pore pressure of a point", needs=("pore_pressure_max_anywhere",),
     ),
     Figure(
-        "retained_volume", "m3/m", "material upstream of the crest at the end, at the flow's initial density",
+        "retained_volume", VOLUME, "material upstream of the crest at the end, at the flow's initial density",
         "volume retained", short="retained",
     ),
     Figure(
-        "on_crest_volume", "m3/m", "material above the crest at the end", "volume on the crest",
+        "on_crest_volume", VOLUME, "material above the crest at the end", "volume on the crest",
         short="on the crest",
     ),
     Figure(
-        "overtopped_volume", "m3/m",
+        "overtopped_volume", VOLUME,
         "material beyond the crest at the end; left_volume is what has left the domain",
         "volume overtopped", short="beyond",
     ),
     Figure(
-        "inflow_volume", "m3/m", "what has arrived at the section of the inflow until the end, at the flow's density",
+        "inflow_volume", VOLUME, "what has arrived at the section of the inflow until the end, at the flow's density",
         "volume that has arrived", short="arrived", needs=("inflow_mass",),
     ),
-    Figure("deposited_volume", "m3/m", "what lay there at the start as a deposit", "volume deposited before"),
+    Figure("deposited_volume", VOLUME, "what lay there at the start as a deposit", "volume deposited before"),
     Figure(
         "mass_error", "-",
         "greatest change of the mass of both phases, inside and departed together, over the initial mass",
