@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from .simulator.laws import DEFAULT, LAWS, Law
+from .simulator.point_field import PointField
 from .simulator.schemes import SCHEMES, Scheme
 
 LONGEST_NAME = 220
@@ -23,6 +24,8 @@ class Effects:
 
     formulation: Literal["dry", "undrained", "two_phase"]
     """Dry and undrained: one velocity field. Two-phase: solid and liquid velocities (a_S-a_L formulation)."""
+    dimensions: Literal[2, 3] = 2
+    """2: plane strain, per metre of width. 3: a section that goes on along z (`warp_mpm.channel`)."""
     precision: Literal["float64", "float32"] = "float64"
     """Scalar type of points and grid; time, ledger and barrier are float64 throughout."""
     law: str = DEFAULT
@@ -84,6 +87,12 @@ class Effects:
         return SCHEMES.keyed(self.transfer)
 
     @property
+    def point_fields(self) -> dict[str, PointField]:
+        """What a point stores for the law and for the scheme."""
+        across = self.scheme.point_fields_in_space if self.dimensions == 3 else {}
+        return {**self.skeleton.point_fields, **self.scheme.point_fields, **across}
+
+    @property
     def two_phase(self) -> bool:
         return self.formulation == "two_phase"
 
@@ -110,7 +119,8 @@ class Effects:
     @property
     def module_name(self) -> str:
         """Name of the Warp module: one per set of effects."""
-        flags: list[str] = [self.formulation, self.precision, self.law, self.transfer, self.drag]
+        flags: list[str] = ["space"] if self.dimensions == 3 else []
+        flags += [self.formulation, self.precision, self.law, self.transfer, self.drag]
         flags += [
             name
             for name in (

@@ -28,6 +28,10 @@ class GridLayout:
     bottom: float
     columns: int
     rows: int
+    layers: int = 1
+    """In space such grids lie one behind the other."""
+    front: float = 0.0
+    """z of the first layer's front edge [m], a multiple of the spacing."""
 
     @property
     def ground_row(self) -> int:

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache, wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from .channel import Channel
 from .discretization import MaterialPoints, material_points
 from .effect_rules import derive_effects
 from .grid import fit_grid
@@ -179,17 +180,34 @@ class Simulation:
         scenario: what to simulate.
         device: a Warp device, "cpu" or "cuda:0".
         bodies: solid bodies beside those of the scenario, which the flow meets as well.
+        channel: makes the scenario a section of it, and the simulation one in space; None: a simulation in the plane,
+            per metre of width.
 
     Raises:
-        ValueError: the device does not exist, or the bodies are no scene's: two of one name, flow inside one of them.
+        ValueError: the device does not exist; the bodies are no scene's: two of one name, flow inside one of them; or
+            what the scenario asks for is not there in space.
         MemoryError: the device, or this process, may not have what the scene needs.
     """
 
     @_one_thread_at_a_time
-    def __init__(self, scenario: Scenario, *, device: str = "cpu", bodies: Sequence[Body] = ()) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        device: str = "cpu",
+        bodies: Sequence[Body] = (),
+        channel: Channel | None = None,
+    ) -> None:
         self.scenario = scenario
+        self.channel = channel
+        """The third dimension; None in the plane."""
+        if channel is not None:
+            channel.check(scenario, bodies)
         self.grid = fit_grid(scenario, [body.outline.vertices for body in bodies])
         self.bodies: tuple[Body, ...] = (*scene_bodies(scenario, self.grid), *bodies)
+        if channel is not None:
+            self.grid = channel.stacked(self.grid)
+            self.bodies += tuple(channel.walls())
         """All that the flow meets, in the order in which they act on it."""
         _check_names(self.bodies)
         self.slots = slots_of(scenario, self.bodies)
@@ -197,6 +215,8 @@ class Simulation:
         if self.slots is not None:
             self._patches = Patches.along(self.slots.face, scenario.output.pressure_patch_m)
         self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
+        if channel is not None:
+            self.effects = replace(self.effects, dimensions=3)
         _start_warp()
         try:
             self.device = wp.get_device(device)
@@ -221,6 +241,8 @@ class Simulation:
         )
         with memory_for(scenario):
             initial = material_points(scenario)
+            if channel is not None:
+                initial = channel.drawn(initial, scenario)
             _check_room(bodies, initial, self.grid.spacing)
             self.material_points = len(initial.volume)
             self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
@@ -246,13 +268,15 @@ class Simulation:
         self._barrier = next((number for number, body in enumerate(self.bodies) if body.name == BARRIER), None)
         further = {one.name for one in scenario.barriers}
         self._further = [number for number, body in enumerate(self.bodies) if body.name in further]
-        self._quantities = sampled_quantities(scenario, self.bodies)
+        self._quantities = sampled_quantities(scenario, self.bodies, self.effects.dimensions)
         self._since = self.window()
         """When the last call of `advance` that made a step began."""
         moving = (initial.velocity != 0.0).any(axis=1)
         flow_mass = float(initial.solid_mass[moving].sum() + initial.liquid_mass[moving].sum())
-        self._scene_mark = saved.scene_mark(scenario.resolved())
-        self._initial_momentum = [flow_mass * velocity for velocity in scenario.flow.velocity_m_per_s]
+        drawn = {"channel": asdict(channel)} if channel is not None else {}
+        self._scene_mark = saved.scene_mark(scenario.resolved() | drawn)
+        velocities = (*scenario.flow.velocity_m_per_s, 0.0)[: self.effects.dimensions]
+        self._initial_momentum = [flow_mass * velocity for velocity in velocities]
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
@@ -479,6 +503,8 @@ class Simulation:
         """
         if len(self._entry):
             raise ValueError("set_points knows no flow that arrives (flow.inflow)")
+        if self.channel is not None and not {"solid_velocity", "liquid_velocity"}.isdisjoint(state):
+            raise ValueError("set_points knows no velocities in three dimensions yet")
         if self.steps > 0:
             raise ValueError("set_points changes the initial state; this simulation has made steps already")
         now = self.points()
@@ -505,12 +531,12 @@ class Simulation:
         if self.effects.liquid:
             self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)
         clock = self._clock.numpy()
-        clock[at.SPEED_MAX] = (velocity.reshape(-1, 2) ** 2).sum(axis=1).max()
+        clock[at.SPEED_MAX] = (velocity.reshape(-1, self.effects.dimensions) ** 2).sum(axis=1).max()
         self._clock.assign(clock)
         if self.effects.two_phase:
             balance = self._balance.numpy()
             slip = liquid @ (now["liquid_velocity"] - now["solid_velocity"])
-            balance[at.SEEPAGE_POWER_BEFORE] = slip @ np.array(self.scenario.gravity.vector)
+            balance[at.SEEPAGE_POWER_BEFORE] = slip[:2] @ np.array(self.scenario.gravity.vector)
             self._balance.assign(balance)
 
     # -- state -------------------------------------------------------------------------------------------------
@@ -617,7 +643,8 @@ class Simulation:
         `position`, `solid_velocity`, `liquid_velocity` [N, 2] (the last with two phases only); `effective_stress`
         [N, 4] (xx, yy, zz, xy, tension positive); `pore_pressure` (compression positive; not if dry), `porosity`,
         `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N]. What the law or the transfer scheme
-        keeps at a point besides, and has a meaning for, comes when it is named.
+        keeps at a point besides, and has a meaning for, comes when it is named. In space vectors are [N, 3], and
+        stresses [N, 6] (yz and xz besides).
         """
         inside = self._point_arrays["inside"].numpy() == at.INSIDE
         rows = slice(None) if inside.all() else inside
@@ -637,7 +664,7 @@ class Simulation:
 
         quantities: dict[str, Callable[[], NDArray[np.float64]]] = {
             "position": lambda: stored("position"),
-            "solid_velocity": lambda: stored("velocity")[:, :2],
+            "solid_velocity": lambda: stored("velocity")[:, : self.effects.dimensions],
             "effective_stress": lambda: stored("stress"),
             "deviatoric_strain": lambda: stored("deviatoric_strain"),
             "volume": lambda: np.maximum(stored("volume"), grains()),
@@ -646,13 +673,13 @@ class Simulation:
             "porosity": porosity,
         }
         if self.effects.two_phase:
-            quantities["liquid_velocity"] = lambda: stored("velocity")[:, 2:]
+            quantities["liquid_velocity"] = lambda: stored("velocity")[:, self.effects.dimensions :]
         if self.effects.liquid:
             quantities["pore_pressure"] = lambda: np.maximum(
                 -material.liquid_bulk_modulus_Pa * stored("liquid_strain"), -material.cavitation_pressure_Pa
             )
         shown = quantities if names is None else names
-        own = {**self.effects.skeleton.point_fields, **self.effects.scheme.point_fields}
+        own = self.effects.point_fields
         return {name: stored(name) if name in own else quantities[name]() for name in shown}
 
     def window(self) -> Window:
@@ -745,6 +772,11 @@ class Simulation:
             balanced=self._read("balance").tolist(),
             **({"arrived": self._read("inflow").tolist()} if self.effects.arriving else {}),
         )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each quantity of a sample, by its key: per metre of width in the plane, of the whole in space."""
+        return {key: quantity.unit for key, quantity in self._quantities.items()}
 
     @property
     def record(self) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from .pore_pressure import make_pore_pressure
 from .seepage import make_seepage
 from .shape_functions import make_shape_functions
 from .transfer import make_transfer
+from .vectors import make_vectors
 
 CPU_COMPILER_FLAGS = (
     "-march=native -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000 -ffp-contract=fast"
@@ -44,7 +45,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     options: dict[str, Any] = {
         "enable_backward": False,
         "cpu_compiler_flags": CPU_COMPILER_FLAGS,
-        "max_unroll": LONGEST_UNROLLED,
+        "max_unroll": LONGEST_UNROLLED if effects.dimensions == 2 else 1,
     }
     if CHECKED:
         options["mode"] = "debug"
@@ -53,25 +54,26 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     shapes = make_shape_functions(types)
     pore = make_pore_pressure(types)
     elementary = make_elementary(types)
-    tools = SimpleNamespace(**elementary.__dict__, **shapes.__dict__)
+    vectors = make_vectors(types)
+    tools = SimpleNamespace(**elementary.__dict__, **shapes.__dict__, **vectors.__dict__)
     types.scheme = SimpleNamespace(**scheme_functions(effects.scheme, types, tools))
     types.law = SimpleNamespace(**law_functions(effects.skeleton, types, tools))
     bodies = make_body_functions(types, elementary) if effects.bodies else None
-    transfer = make_transfer(types, shapes, pore, bodies, module)
-    constitutive = make_constitutive(types, shapes, pore, bodies, module)
+    transfer = make_transfer(types, shapes, vectors, pore, bodies, module)
+    constitutive = make_constitutive(types, shapes, vectors, pore, bodies, module)
     clock = make_clock(types, bodies, module)
     kernels = SimpleNamespace(
         types=types,
-        move=make_grid_momentum(types, module).move,
+        move=make_grid_momentum(types, vectors, module).move,
         **transfer.__dict__,
         **constitutive.__dict__,
         start=clock.start,
         tick=clock.tick,
-        ledger=make_ledger(types, pore, module).ledger,
+        ledger=make_ledger(types, vectors, pore, module).ledger,
         **effects.scheme.kernels(types, tools, module),
     )
     if effects.two_phase:
-        kernels.seep = make_seepage(types, module).seep
+        kernels.seep = make_seepage(types, vectors, module).seep
     if effects.bodies:
-        kernels.__dict__.update(make_contact(types, shapes, bodies, module).__dict__)
+        kernels.__dict__.update(make_contact(types, shapes, vectors, bodies, module).__dict__)
     return kernels

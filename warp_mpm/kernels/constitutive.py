@@ -16,6 +16,7 @@ from .layout import (
     LEFT_LIQUID_MASS,
     LEFT_MOMENTUM_X,
     LEFT_MOMENTUM_Y,
+    LEFT_MOMENTUM_Z,
     LEFT_SOLID_MASS,
     POINTS_LEFT,
     POINTS_PUSHED,
@@ -29,7 +30,12 @@ WORST = 0.6
 
 
 def make_constitutive(
-    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, bodies_of: Any, module: str
+    types: SimpleNamespace,
+    shapes: SimpleNamespace,
+    vectors: SimpleNamespace,
+    pore: SimpleNamespace,
+    bodies_of: Any,
+    module: str,
 ) -> SimpleNamespace:
     """Build the kernels `advect`, `update` and `bound` (over points).
 
@@ -39,14 +45,17 @@ def make_constitutive(
     """
     effects = types.effects
     F = types.scalar
-    V2 = types.V2
-    V4 = types.V4
+    X, T, G = types.X, types.T, types.G
     S = types.S
     Points = types.Points
     Grid = types.Grid
     Parameters = types.Parameters
     hats = shapes.hats
-    cell_of = shapes.cell_of
+    cell_of, layer_of = shapes.cell_of, shapes.layer_of
+    solid_of, liquid_of, section, across = vectors.solid_of, vectors.liquid_of, vectors.section, vectors.across
+    trace, shear_rate, sound = vectors.trace, vectors.shear_rate, vectors.sound
+    SPATIAL = types.dimensions == 3
+    CORNER_LAYERS = 2 if SPATIAL else 1
     pressure_at = pore.pressure
     porosity = pore.porosity
     elementary = make_elementary(types)
@@ -86,7 +95,7 @@ def make_constitutive(
     @wp.func
     def rest(points: Points, p: wp.int32):
         """Make a point one at rest to `update`, which passes over all of them: nothing of it changes."""
-        points.gradient[p] = V4()
+        points.gradient[p] = G()
         if CORNERS:
             points.smooth[p] = S()
         if RELAXATION:
@@ -96,27 +105,43 @@ def make_constitutive(
         law_leave(points, p)
 
     @wp.func
-    def leave(points: Points, p: wp.int32, x: V2, parameters: Parameters, left: wp.array(dtype=wp.float64)):
+    def leave(points: Points, p: wp.int32, x: X, parameters: Parameters, left: wp.array(dtype=wp.float64)):
         """Take a point out of the domain, and keep account of what it takes along."""
         points.inside[p] = 0
         rest(points, p)  # passed over from now on, but by `update`
         reference = points.reference_volume[p]
         v = points.velocity[p]
         solid = parameters.solid_density * reference
-        momentum = solid * V2(v[0], v[1])
-        energy = F(0.5) * solid * (v[0] * v[0] + v[1] * v[1])
+        of_solid = solid_of(v)
+        momentum = solid * of_solid
+        energy = F(0.5) * solid * wp.dot(of_solid, of_solid)
         total = solid
         if TWO_PHASE:
             liquid = parameters.liquid_density * reference
-            momentum += liquid * V2(v[2], v[3])
-            energy += F(0.5) * liquid * (v[2] * v[2] + v[3] * v[3])
+            of_liquid = liquid_of(v)
+            momentum += liquid * of_liquid
+            energy += F(0.5) * liquid * wp.dot(of_liquid, of_liquid)
             total += liquid
             wp.atomic_add(left, wp.static(LEFT_LIQUID_MASS), wp.float64(liquid))
         energy -= total * wp.dot(parameters.gravity, x)
         wp.atomic_add(left, wp.static(LEFT_SOLID_MASS), wp.float64(solid))
         wp.atomic_add(left, wp.static(LEFT_MOMENTUM_X), wp.float64(momentum[0]))
         wp.atomic_add(left, wp.static(LEFT_MOMENTUM_Y), wp.float64(momentum[1]))
+        if SPATIAL:
+            wp.atomic_add(left, wp.static(LEFT_MOMENTUM_Z), wp.float64(momentum[2]))
         wp.atomic_add(left, wp.static(LEFT_ENERGY), wp.float64(energy))
+
+    @wp.func
+    def in_grid(x: X, sx: F, sy: F, parameters: Parameters) -> wp.bool:
+        """Whether a point lies two cells and more away from the edges of the grid."""
+        margin = F(2.0)
+        result = (
+            sx >= margin and sx < F(parameters.columns) - margin and sy >= margin and sy < F(parameters.rows) - margin
+        )
+        if SPATIAL:
+            sz = (x[2] - parameters.front) * parameters.inverse_spacing
+            result = result and sz >= margin and sz < F(parameters.layers) - margin
+        return result
 
     @wp.kernel(module=module)
     def advect(
@@ -140,11 +165,21 @@ def make_constitutive(
             hy = hats(fy)
             smooth = S()
             least_filling = F(1.0)
-            for k in range(2):
-                for m in range(2):
-                    corner = read(grid.corner, first + k * parameters.rows + m)
-                    smooth += (hx[k] * hy[m]) * corner
-                    least_filling = smaller(corner[0], least_filling)
+            if SPATIAL:
+                cl, fz = layer_of(x, parameters)
+                first += (cl - 1) * parameters.layer
+                hz = hats(fz)
+            for q in range(wp.static(CORNER_LAYERS)):
+                for k in range(2):
+                    for m in range(2):
+                        place = first + k * parameters.rows + m
+                        share = hx[k] * hy[m]
+                        if SPATIAL:
+                            place += q * parameters.layer
+                            share *= hz[q]
+                        corner = read(grid.corner, place)
+                        smooth += share * corner
+                        least_filling = smaller(corner[0], least_filling)
             if RELAXATION:
                 # With the part that was left out of the average.
                 smooth[2] += parameters.true_liquid_density * wp.dot(parameters.gravity, x)
@@ -159,10 +194,7 @@ def make_constitutive(
             shift = F(grid.shift[1])
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
         sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
-        margin = F(2.0)
-        within = (
-            sx >= margin and sx < F(parameters.columns) - margin and sy >= margin and sy < F(parameters.rows) - margin
-        )
+        within = in_grid(x, sx, sy, parameters)
         if BODIES:
             solid = wp.int32(1)
             if RESTING:
@@ -170,26 +202,21 @@ def make_constitutive(
                     solid = read(grid.solid, wp.int32(sx) * parameters.rows + wp.int32(sy)) & wp.static(DEEP)
             if solid != 0:
                 for body in range(bodies.count):
-                    if in_box(read(bodies.ahead, body), x):
-                        seen = x
+                    seen = section(x)
+                    if in_box(read(bodies.ahead, body), seen):
                         if MOVING:
                             seen -= read(bodies.next, body)
                         first_piece, last_piece = about(bodies, body, wp.int32(sx), parameters.columns)
                         pushed = set_back(bodies.pieces, first_piece, last_piece, seen, F(-0.5) * parameters.spacing)
                         if pushed[0] != F(0.0) or pushed[1] != F(0.0):
-                            x += pushed
+                            x += across(pushed)
                             wp.atomic_add(book.counters, wp.static(POINTS_PUSHED), 1)
                 sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
                 sy = (x[1] - parameters.bottom) * parameters.inverse_spacing
-                within = (
-                    sx >= margin
-                    and sx < F(parameters.columns) - margin
-                    and sy >= margin
-                    and sy < F(parameters.rows) - margin
-                )
+                within = in_grid(x, sx, sy, parameters)
         if not within:
             # A position that is no number compares false above; such a point has not left, the run has diverged.
-            if wp.isfinite(x[0]) and wp.isfinite(x[1]):
+            if sound(x):
                 leave(points, p, x, parameters, book.left)
                 wp.atomic_add(book.counters, wp.static(POINTS_LEFT), 1)
             else:
@@ -209,8 +236,8 @@ def make_constitutive(
     def settle(
         points: Points,
         p: wp.int32,
-        stress: V4,
-        gradient: V4,
+        stress: T,
+        gradient: G,
         volume: F,
         gap: F,
         time_step: F,
@@ -239,7 +266,7 @@ def make_constitutive(
             parameters = points.materials[read(points.material, p)]
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
-        divergence = gradient[0] + gradient[3]
+        divergence = trace(gradient)
         smooth = S()
         if CORNERS:
             smooth = read(points.smooth, p)
@@ -264,12 +291,10 @@ def make_constitutive(
 
         if DENSITY:
             # What the points around claim over what there is; a flow that is compressed claims less.
-            stretch = gradient[0] - gradient[3]
-            shear = gradient[1] + gradient[2]
             ratio = smooth[0] * volume / reference
             now = larger(smaller(ratio - F(1.0), F(wp.static(WORST))), -F(wp.static(WORST)))
             crowding = read(points.crowding, p)
-            share = smaller(time_step * wp.sqrt(stretch * stretch + shear * shear), F(1.0))
+            share = smaller(time_step * shear_rate(gradient), F(1.0))
             write(points.crowding, p, crowding + share * (now - crowding))
 
         volume_strain = divergence * time_step
@@ -319,9 +344,9 @@ def make_constitutive(
         volume = read(points.volume, p)
         if volume < grains:
             # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
-            v = read(points.velocity, p)
+            v = solid_of(read(points.velocity, p))
             gain = wp.float64(wp.sqrt(grains / volume) - F(1.0)) * parameters.wave_speed
-            speed = wp.float64(wp.sqrt(v[0] * v[0] + v[1] * v[1])) + gain
+            speed = wp.float64(wp.sqrt(wp.dot(v, v))) + gain
             wp.atomic_max(book.clock, wp.static(SPEED_MAX), speed * speed)
             wp.atomic_add(book.limiters, wp.static(VOIDS_CLOSED), wp.float64(1.0))
         if LIQUID_GAP:

@@ -37,9 +37,9 @@ MOST = 100
 """Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
 the flow."""
 
-NODES = 9
-"""Around a place, counted column by column. A loop of more than three rounds is not written out: contact is half of
-what there is to compile, and a small share of a step."""
+NODES = {2: 9, 3: 27}
+"""Around a place, by the number of dimensions, counted column by column. A loop of more than three rounds is not
+written out: contact is half of what there is to compile, and a small share of a step."""
 
 REACHED = 0.75
 """Share of a place's weights that must lie on nodes with mass before the flow counts as there: more than the half that
@@ -47,12 +47,14 @@ lies on the nodes before the surface, which a flow has that is still to come. Fr
 far, to 0.1 %."""
 
 
-def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any, module: str) -> SimpleNamespace:
+def make_contact(
+    types: SimpleNamespace, shapes: SimpleNamespace, vectors: SimpleNamespace, bodies_of: Any, module: str
+) -> SimpleNamespace:
     """Build the kernels `press` (over groups of places that stand alone) and `join` (one block of threads, over all
     others)."""
     effects = types.effects
     F = types.scalar
-    V2 = types.V2
+    V2, X = types.V2, types.X
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
@@ -72,6 +74,12 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     read, write = elementary.read, elementary.write
     weights, cell_of = shapes.weights, shapes.cell_of
     displaced, look_ahead = bodies_of.displaced, bodies_of.look_ahead
+    of_phases, solid_of, liquid_of = vectors.of_phases, vectors.solid_of, vectors.liquid_of
+    slip_along, limited, along, across = vectors.slip_along, vectors.limited, vectors.along, vectors.across
+    DIMENSIONS = types.dimensions
+    SPATIAL = DIMENSIONS == 3
+    AROUND = NODES[DIMENSIONS]
+    RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
@@ -82,10 +90,14 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         wy = contact.weight_y[e]
         result = F(0.0)
         total = F(0.0)
-        for k in range(NODES):
-            w = wx[k / 3] * wy[k % 3]
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
             if w > F(0.0):
-                mass = read(grid.mass, first + (k / 3) * parameters.rows + k % 3)
+                mass = read(grid.mass, node)
                 if mass > F(0.0):
                     result += w * w / mass
                     total += w
@@ -103,19 +115,29 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         result = V()
-        for k in range(NODES):
-            result += (wx[k / 3] * wy[k % 3]) * read(grid.velocity, first + (k / 3) * parameters.rows + k % 3)
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
+            result += w * read(grid.velocity, node)
         return result
 
     @wp.func
-    def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V2:
+    def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
         first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
-        result = V2()
-        for k in range(NODES):
-            result += (wx[k / 3] * wy[k % 3]) * read(grid.liquid_alone, first + (k / 3) * parameters.rows + k % 3)
+        result = X()
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
+            result += w * read(grid.liquid_alone, node)
         return result
 
     @wp.func
@@ -124,10 +146,13 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
-        for k in range(NODES):
-            w = wx[k / 3] * wy[k % 3]
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
             if w > F(0.0):
-                node = first + (k / 3) * parameters.rows + k % 3
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
                     write(grid.velocity, node, read(grid.velocity, node) + (w / mass) * impulse)
@@ -138,24 +163,30 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
-        for k in range(NODES):
-            w = wx[k / 3] * wy[k % 3]
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
             if w > F(0.0):
-                node = first + (k / 3) * parameters.rows + k % 3
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
                     i = node / parameters.rows
                     receive(grid, i, node - i * parameters.rows, (w / mass) * impulse)
 
     @wp.func
-    def give_alone(contact: Contact, e: wp.int32, impulse: V2, grid: Grid, parameters: Parameters):
+    def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
         first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
-        for k in range(NODES):
-            w = wx[k / 3] * wy[k % 3]
+        for k in range(AROUND):
+            w = wx[(k / 3) % 3] * wy[k % 3]
+            node = first + ((k / 3) % 3) * parameters.rows + k % 3
+            if SPATIAL:
+                w *= contact.weight_z[e][k / 9]
+                node += (k / 9) * parameters.layer
             if w > F(0.0):
-                node = first + (k / 3) * parameters.rows + k % 3
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
                     write(grid.liquid_alone, node, read(grid.liquid_alone, node) + (w / mass) * impulse)
@@ -173,25 +204,22 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
     def whole(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> V:
         """All that the place has given in the step, in the form that `give` takes."""
         n = contact.normal[e]
-        t = V2(-n[1], n[0])
         solid = contact.solid[e] * n
-        result = V()
+        liquid = X()
         if TWO_PHASE:
             liquid = (contact.liquid[e] / parameters.liquid_ratio) * n
             if FRICTION:
                 share = drag_share(parameters, time_step)
                 rub = contact.rubbed[e] / (F(1.0) + parameters.liquid_ratio * share)
-                solid += rub * t
-                liquid += (share * rub) * t
-            result = V(solid[0], solid[1], liquid[0], liquid[1])
+                solid += along(rub, n)
+                liquid += along(share * rub, n)
         else:
             if FRICTION:
-                solid += contact.rubbed[e] * t
-            result = V(solid[0], solid[1])
-        return result
+                solid += along(contact.rubbed[e], n)
+        return of_phases(solid, liquid)
 
     @wp.func
-    def on_body(contact: Contact, e: wp.int32) -> V2:
+    def on_body(contact: Contact, e: wp.int32) -> X:
         """Impulse of the flow on the surface, Eq. (A14)."""
         n = contact.normal[e]
         total = contact.solid[e]
@@ -199,7 +227,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
             total += contact.liquid[e]
         result = -total * n
         if FRICTION:
-            result -= contact.rubbed[e] * V2(-n[1], n[0])
+            result -= along(contact.rubbed[e], n)
         return result
 
     @wp.func
@@ -210,7 +238,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         return result
 
     @wp.func
-    def react(bodies: Bodies, body: wp.int32, impulse: V2):
+    def react(bodies: Bodies, body: wp.int32, impulse: X):
         """Note what a body that slides takes from the flow."""
         if SLIDING:
             if slides(bodies, body):
@@ -304,22 +332,21 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         """Bring one place's impulses to what the velocities there now call for."""
         inverse = contact.inverse[e]
         n = contact.normal[e]
-        t = V2(-n[1], n[0])
         body = contact.body[e]
-        surface = V2()
+        surface = X()
         give_way = F(0.0)
         give_way_along = F(0.0)
         if MOVING:
             v = bodies.velocity[body]
-            surface = V2(F(v[0]), F(v[1]))
+            surface = across(V2(F(v[0]), F(v[1])))
             if SLIDING:
                 if slides(bodies, body):
                     # As many places as are done at the same time share the body's mass.
                     inverse_body = contact.abreast / F(bodies.mass[body])
                     give_way = inverse_body * n[0] * n[0]
-                    give_way_along = inverse_body * t[0] * t[0]
+                    give_way_along = inverse_body * n[1] * n[1]
         velocity = seen(contact, e, grid, parameters)
-        solid_velocity = V2(velocity[0], velocity[1]) - surface
+        solid_velocity = solid_of(velocity) - surface
         old = contact.solid[e]
         new = wp.max(old - wp.dot(solid_velocity, n) / (inverse + give_way), F(0.0))
         contact.solid[e] = new
@@ -327,9 +354,9 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         given = change * n
         push = -change * n
         change_alone = F(0.0)
-        liquid_given = V2()
+        liquid_given = X()
         if TWO_PHASE:
-            liquid_velocity = V2(velocity[2], velocity[3]) - surface
+            liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
             liquid_inverse = inverse / parameters.liquid_ratio
             old_liquid = contact.liquid[e]
@@ -360,22 +387,19 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
                 if TWO_PHASE:
                     share = drag_share(parameters, time_step)
                     inertia += parameters.liquid_ratio * share
-                slip = wp.dot(solid_velocity, t)
+                slip = slip_along(solid_velocity, n)
                 old_rub = contact.rubbed[e]
                 mobility = inverse / inertia + give_way_along
                 if TURBULENCE:
                     limit += turbulent(contact, e, bodies, slip - old_rub * mobility, limit, mobility, time_step)
-                new_rub = wp.clamp(old_rub - slip / mobility, -limit, limit)
+                new_rub = limited(old_rub - slip / mobility, limit)
                 contact.rubbed[e] = new_rub
                 rub = new_rub - old_rub
-                push -= rub * t
-                given += (rub / inertia) * t
+                push -= along(rub, n)
+                given += along(rub / inertia, n)
                 if TWO_PHASE:
-                    liquid_given += (share * rub / inertia) * t
-        if TWO_PHASE:
-            give(contact, e, V(given[0], given[1], liquid_given[0], liquid_given[1]), grid, parameters)
-        else:
-            give(contact, e, V(given[0], given[1]), grid, parameters)
+                    liquid_given += along(share * rub / inertia, n)
+        give(contact, e, of_phases(given, liquid_given), grid, parameters)
         if CARRIED:
             if change_alone != F(0.0):
                 give_alone(contact, e, change_alone * n, grid, parameters)
@@ -401,7 +425,7 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         """The nodes of a place, and what they weigh."""
         wet = wp.bool(True)
         if contact.fixed[e] == 0:
-            at = contact.position[e] + displaced(bodies, contact.body[e])
+            at = contact.position[e] + across(displaced(bodies, contact.body[e]))
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
             contact.first[e] = wp.int32(-1)
             if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
@@ -434,11 +458,11 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
             wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.liquid[e]))
         elif CARRIED:
             wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.alone[e]))
-        if FRICTION:
+        if RUBS_ALONG:
             wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(contact.rubbed[e]))
 
     @wp.func
-    def note(contact: Contact, e: wp.int32, slot: wp.int32, surface: wp.int32, force: V2):
+    def note(contact: Contact, e: wp.int32, slot: wp.int32, surface: wp.int32, force: X):
         """Keep where along the barrier the impulse acted, and its moment about the barrier's toe."""
         foot = contact.foot[e]
         wp.atomic_add(contact.turned, 2 * surface, foot[1] * wp.float64(force[0]))
@@ -461,8 +485,8 @@ def make_contact(types: SimpleNamespace, shapes: SimpleNamespace, bodies_of: Any
         give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
         force = on_body(contact, e)
         surface = contact.surface[e]
-        wp.atomic_add(reactions, 2 * surface, wp.float64(force[0]))
-        wp.atomic_add(reactions, 2 * surface + 1, wp.float64(force[1]))
+        for axis in range(wp.static(DIMENSIONS)):
+            wp.atomic_add(reactions, wp.static(DIMENSIONS) * surface + axis, wp.float64(force[axis]))
         slot = contact.slot[e]
         if slot >= 0:
             note(contact, e, slot, surface, force)

@@ -7,11 +7,10 @@ import warp as wp
 from .layout import BLOCK, TIME_STEP
 
 
-def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build the kernel `move` (workers on the blocks in use)."""
     effects = types.effects
     F = types.scalar
-    V2 = types.V2
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
@@ -23,18 +22,17 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
     BEYOND = "drag_beyond" in types.grid_fields
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
+    per_phase, of_phases = vectors.per_phase, vectors.of_phases
+    solid_of, liquid_of = vectors.solid_of, vectors.liquid_of
 
     @wp.func
     def per_mass(mass: F, parameters: Parameters) -> V:
         """One over the mass of the phase that each entry of a node's velocity belongs to."""
         solid = F(1.0) / mass
-        result = V()
+        liquid = F(0.0)
         if TWO_PHASE:
             liquid = solid / parameters.liquid_ratio
-            result = V(solid, solid, liquid, liquid)
-        else:
-            result = V(solid, solid)
-        return result
+        return per_phase(solid, liquid)
 
     @wp.func
     def dragged(free: V, coefficient: F, beyond: F, parameters: Parameters, time_step: F) -> V:
@@ -49,30 +47,23 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
         solid_share = F(1.0) / (F(1.0) + parameters.liquid_ratio)
         liquid_share = parameters.liquid_ratio * solid_share
         lost = coefficient * parameters.drag_rate * time_step
+        slip = liquid_of(free) - solid_of(free)
         if INERTIAL_DRAG:
-            slip_x = free[2] - free[0]
-            slip_y = free[3] - free[1]
             growth = beyond * parameters.inertial_drag_rate * time_step
-            growth *= F(4.0) * wp.sqrt(slip_x * slip_x + slip_y * slip_y)
+            growth *= F(4.0) * wp.sqrt(wp.dot(slip, slip))
             linear = F(1.0) + lost
             lost += growth / (linear + wp.sqrt(linear * linear + growth)) * F(0.5)
         if IMPLICIT_DRAG:
             lost = lost / (F(1.0) + lost)
-        x = lost * (free[2] - free[0])
-        y = lost * (free[3] - free[1])
-        return free + V(liquid_share * x, liquid_share * y, -solid_share * x, -solid_share * y)
+        exchange = lost * slip
+        return free + of_phases(liquid_share * exchange, -solid_share * exchange)
 
     @wp.kernel(module=module)
     def move(grid: Grid, parameters: Parameters, book: Book):
         """From the momentum of every node in use to its velocity."""
         worker = wp.tid()
         time_step = F(book.clock[wp.static(TIME_STEP)])
-        g = parameters.gravity
-        gravity = V()
-        if TWO_PHASE:
-            gravity = V(g[0], g[1], g[0], g[1])
-        else:
-            gravity = V(g[0], g[1])
+        gravity = of_phases(parameters.gravity, parameters.gravity)
         for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
             block = grid.active[s / wp.static(BLOCK)]
             bi = block / parameters.block_rows
@@ -87,7 +78,7 @@ def make_grid_momentum(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     new = free_velocity(grid, i, j, inverse, gravity, time_step)
                     if LIQUID_ALONE:
                         if TWO_PHASE:
-                            grid.liquid_alone[i, j] = V2(new[2], new[3])
+                            grid.liquid_alone[i, j] = liquid_of(new)
                         else:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if TWO_PHASE:

@@ -4,6 +4,10 @@ Grid indices: node (i, j) lies at x = origin + (i + 1/2) d, y = bottom + (j + 1/
 B-splines, and with them the corners of the cells, fall on multiples of the spacing d. A flat ground, wall or upright
 barrier face on such a multiple is then met exactly by mirrored pairs of nodes. Corner (i, j) of the smoothing grid lies
 at x = origin + (i + 1) d, y = bottom + (j + 1) d: the upper right corner of the cell around node (i, j).
+
+In space the grid is a stack of such grids, one behind the other: the nodes of layer l, at z = front + (l + 1/2) d, are
+the rows l columns to (l + 1) columns - 1 of the same arrays. Whatever goes over nodes alone does not know of it, and
+blocks are those of one layer.
 """
 
 from __future__ import annotations
@@ -99,7 +103,9 @@ LEDGER_PRESSURE_MEAN = 9
 """Greatest pressure upstream of the crest's end, less its noise about the mean over a cell."""
 LEDGER_NOT_FINITE = 10
 """Material points of which some quantity is not a finite number."""
-LEDGER_SIZE = 11
+LEDGER_MOMENTUM_Z = 11
+"""In space."""
+LEDGER_SIZE = 12
 
 # What left the domain, a float64 array.
 LEFT_SOLID_MASS = 0
@@ -108,6 +114,8 @@ LEFT_MOMENTUM_X = 2
 LEFT_MOMENTUM_Y = 3
 LEFT_ENERGY = 4
 LEFT_SIZE = 5
+LEFT_MOMENTUM_Z = LEFT_SIZE
+"""In space, where the array is longer by one."""
 
 # What has arrived at the section of an inflow, a float64 array.
 INFLOW_SOLID_MASS = 0
@@ -164,34 +172,42 @@ def _structure(name: str, fields: dict[str, Any]) -> Any:
 def layout(effects: Effects) -> SimpleNamespace:
     """Scalar, vector and structure types for `effects`.
 
-    `V` is the vector of all velocities at a place: (v_x, v_y) with one phase, (v_Sx, v_Sy, v_Lx, v_Ly) with two.
+    `V` is the vector of all velocities at a place: (v_x, v_y) with one phase, (v_Sx, v_Sy, v_Lx, v_Ly) with two. `X` is
+    a place, `T` a symmetric tensor, `G` a velocity gradient and `R` what acts along a surface: see `vectors`.
     """
     scalar = wp.float64 if effects.precision == "float64" else wp.float32
-    components = 4 if effects.two_phase else 2
+    dimensions = effects.dimensions
+    components = (2 if effects.two_phase else 1) * dimensions
     V2 = wp.types.vector(2, scalar)
     V3 = wp.types.vector(3, scalar)
     V4 = wp.types.vector(4, scalar)
     V = wp.types.vector(components, scalar)
+    X = wp.types.vector(dimensions, scalar)
+    X64 = wp.types.vector(dimensions, wp.float64)
+    T = wp.types.vector(4 if dimensions == 2 else 6, scalar)
+    G = wp.types.vector(dimensions**2, scalar)
+    R = scalar if dimensions == 2 else X
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     P = wp.types.vector(PIECE, scalar)
     array = wp.array
     types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
+    types.dimensions, types.X, types.X64, types.T, types.G, types.R = dimensions, X, X64, T, G, R
 
     points: dict[str, Any] = {
-        "position": array(dtype=V2),
+        "position": array(dtype=X),
         "velocity": array(dtype=V),
-        "stress": array(dtype=V4),
+        "stress": array(dtype=T),
         "reference_volume": array(dtype=scalar),
         "volume": array(dtype=scalar),
         "deviatoric_strain": array(dtype=scalar),
-        "gradient": array(dtype=V4),
+        "gradient": array(dtype=G),
         "inside": array(dtype=wp.int32),
     }
     if effects.skeleton.opens:
         points["solid_gap"] = array(dtype=scalar)
     if effects.skeleton.extra_stress:
-        points["extra_stress"] = array(dtype=V4)
+        points["extra_stress"] = array(dtype=T)
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
     if effects.smoothing_grid:
@@ -209,8 +225,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     if effects.arriving:
         points["pace"] = array(dtype=scalar)  # velocity of what arrives over its mean over the depth
 
-    for owner in (effects.skeleton, effects.scheme):
-        points |= {name: array(dtype=getattr(types, field.kind)) for name, field in owner.point_fields.items()}
+    points |= {name: array(dtype=getattr(types, field.kind)) for name, field in effects.point_fields.items()}
 
     grid: dict[str, Any] = {
         "mass": array(dtype=scalar, ndim=2),  # of the solid; of the mixture where both phases move as one [kg/m]
@@ -228,7 +243,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it. Contact reads nodes without mass too:
         # `clear` empties them.
-        grid["liquid_alone"] = array(dtype=V2, ndim=2)
+        grid["liquid_alone"] = array(dtype=X, ndim=2)
     if effects.smoothing_grid:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.bodies and not effects.passing:
@@ -250,7 +265,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         "rows": wp.int32,
         "block_rows": wp.int32,
         "workers": wp.int32,  # threads that share the blocks in use
-        "gravity": V2,
+        "gravity": X,
         "solid_density": scalar,  # per volume of mixture: (1 - n) rho_S; undrained: rho_m
         "lame": scalar,
         "shear_modulus": scalar,
@@ -261,6 +276,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         "largest_stable_step": wp.float64,
         "largest_stable_step_counter": wp.int32,  # which of the counters LIMIT_... tells how often it ruled
     }
+    if dimensions == 3:
+        parameters |= {"front": scalar, "layers": wp.int32, "layer": wp.int32}  # z [m]; layers, and nodes of each
     parameters |= dict.fromkeys((*effects.skeleton.constants, *effects.scheme.constants), scalar)
     if effects.dilatancy:
         parameters |= dict.fromkeys(DILATANCY_CONSTANTS, scalar)
@@ -291,7 +308,7 @@ def layout(effects: Effects) -> SimpleNamespace:
             parameters["conductivity_scale"] = scalar  # change of the porosity for a factor of e
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4, P)
-    contact = contact_fields(effects, scalar, V2, V3) if effects.bodies else {}
+    contact = contact_fields(effects, scalar, X, V3, R) if effects.bodies else {}
 
     arrival: dict[str, Any] = {}
     if effects.arriving:

@@ -13,6 +13,7 @@ from .layout import (
     LEDGER_LIQUID_MASS,
     LEDGER_MOMENTUM_X,
     LEDGER_MOMENTUM_Y,
+    LEDGER_MOMENTUM_Z,
     LEDGER_NOT_FINITE,
     LEDGER_PRESSURE_MAX,
     LEDGER_PRESSURE_MEAN,
@@ -21,7 +22,9 @@ from .layout import (
 )
 
 
-def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_ledger(
+    types: SimpleNamespace, vectors: SimpleNamespace, pore: SimpleNamespace, module: str
+) -> SimpleNamespace:
     """Build the kernel `ledger` (over workers that share the points), which adds to an array emptied before."""
     effects = types.effects
     F = types.scalar
@@ -40,6 +43,9 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
     MATERIALS = effects.materials
     Bodies = types.Bodies
     Book = types.Book
+    X64 = types.X64
+    solid_of, liquid_of, squares, wide = vectors.solid_of, vectors.liquid_of, vectors.squares, vectors.wide
+    SPATIAL = types.dimensions == 3
 
     one = wp.constant(wp.float64(1.0))
 
@@ -75,8 +81,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         kinetic_energy = wp.float64(0.0)
         gravitational_energy = wp.float64(0.0)
         elastic_energy = wp.float64(0.0)
-        momentum_x = wp.float64(0.0)
-        momentum_y = wp.float64(0.0)
+        momentum = X64()
         speed_max = wp.float64(0.0)
         pressure_max = wp.float64(0.0)
         pressure_mean = wp.float64(0.0)
@@ -95,22 +100,21 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                 volume = read(points.volume, p)
                 v = read(points.velocity, p)
                 solid = reference * parameters.solid_density
-                speed = v[0] * v[0] + v[1] * v[1]
+                of_solid = solid_of(v)
+                speed = wp.dot(of_solid, of_solid)
                 kinetic = solid * speed
                 mass = solid
-                along_x = solid * v[0]
-                along_y = solid * v[1]
+                along = solid * of_solid
                 if TWO_PHASE:
                     liquid = reference * parameters.liquid_density
-                    liquid_speed = v[2] * v[2] + v[3] * v[3]
+                    of_liquid = liquid_of(v)
+                    liquid_speed = wp.dot(of_liquid, of_liquid)
                     kinetic += liquid * liquid_speed
                     speed = larger(speed, liquid_speed)
                     mass += liquid
-                    along_x += liquid * v[2]
-                    along_y += liquid * v[3]
+                    along += liquid * of_liquid
                     liquid_mass += wp.float64(liquid)
                 s = read(points.stress, p)
-                squares = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + F(2.0) * s[3] * s[3]
                 grains = parameters.grain_share * reference
                 if MATERIALS:
                     own = points.materials[read(points.material, p)]
@@ -118,7 +122,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                 else:
                     elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
                 # Not negative, any of them, so that what is not finite in one shows in the sum.
-                sound = squares + volume + kinetic
+                sound = squares(s) + volume + kinetic
                 if LIQUID:
                     # Taken before the pressure's own maximum, which passes over what is no number.
                     sound += wp.abs(read(points.liquid_strain, p))
@@ -143,8 +147,7 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
                     not_finite += wp.float64(1.0)
                 kinetic_energy += wp.float64(F(0.5) * kinetic)
                 gravitational_energy -= wp.float64(mass * wp.dot(parameters.gravity, read(points.position, p)))
-                momentum_x += wp.float64(along_x)
-                momentum_y += wp.float64(along_y)
+                momentum += wide(along)
                 solid_mass += wp.float64(solid)
                 speed_max = larger(speed_max, wp.float64(speed))
             p += parameters.workers
@@ -152,8 +155,10 @@ def make_ledger(types: SimpleNamespace, pore: SimpleNamespace, module: str) -> S
         wp.atomic_add(book.sums, wp.static(LEDGER_KINETIC), kinetic_energy)
         wp.atomic_add(book.sums, wp.static(LEDGER_GRAVITATIONAL), gravitational_energy)
         wp.atomic_add(book.sums, wp.static(LEDGER_ELASTIC), elastic_energy)
-        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_X), momentum_x)
-        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_Y), momentum_y)
+        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_X), momentum[0])
+        wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_Y), momentum[1])
+        if SPATIAL:
+            wp.atomic_add(book.sums, wp.static(LEDGER_MOMENTUM_Z), momentum[2])
         wp.atomic_max(book.sums, wp.static(LEDGER_SPEED_MAX), speed_max)
         wp.atomic_add(book.sums, wp.static(LEDGER_NOT_FINITE), not_finite)
         if TWO_PHASE:

@@ -7,18 +7,20 @@ import warp as wp
 from .layout import BLOCK, SEEPAGE_POWER
 
 
-def make_seepage(types: SimpleNamespace, module: str) -> SimpleNamespace:
+def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) -> SimpleNamespace:
     """Build the kernel `seep` (workers on the blocks in use), for two phases."""
     F = types.scalar
     Grid = types.Grid
     Parameters = types.Parameters
     Book = types.Book
+    X64 = types.X64
+    solid_of, liquid_of, wide = vectors.solid_of, vectors.liquid_of, vectors.wide
 
     @wp.kernel(module=module)
     def seep(grid: Grid, parameters: Parameters, book: Book):
         """Its rate at the end of the step [W/m]: g . sum m_L (v_L - v_S), over the nodes, which have all momentum."""
         worker = wp.tid()
-        slip = wp.vec2d()
+        slip = X64()
         for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
             block = grid.active[s / wp.static(BLOCK)]
             bi = block / parameters.block_rows
@@ -30,8 +32,7 @@ def make_seepage(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 if mass > F(0.0):
                     v = grid.velocity[i, j]
                     liquid = mass * parameters.liquid_ratio
-                    slip += wp.vec2d(wp.float64(liquid * (v[2] - v[0])), wp.float64(liquid * (v[3] - v[1])))
-        g = wp.vec2d(wp.float64(parameters.gravity[0]), wp.float64(parameters.gravity[1]))
-        wp.atomic_add(book.balance, wp.static(SEEPAGE_POWER), wp.dot(g, slip))
+                    slip += wide(liquid * (liquid_of(v) - solid_of(v)))
+        wp.atomic_add(book.balance, wp.static(SEEPAGE_POWER), wp.dot(wide(parameters.gravity), slip))
 
     return SimpleNamespace(seep=seep)

@@ -10,12 +10,15 @@ import warp as wp
 
 
 def make_shape_functions(types: SimpleNamespace) -> SimpleNamespace:
-    """Build `cell_of(x, shift, parameters)`, the cell that a point lies in and its place there, and of that place
-    `weights(f)`, `slopes(f)` (derivative times d) and `hats(f)`; each sums to one (slopes to zero)."""
+    """Build `cell_of(x, shift, parameters)`, the cell that a point lies in and its place there, for space
+    `layer_of(x, parameters)`, its layer and the place in that, and of such a place `weights(f)`, `slopes(f)`
+    (derivative times d) and `hats(f)`; each sums to one (slopes to zero)."""
     F = types.scalar
     Parameters = types.Parameters
     V2 = types.V2
     V3 = types.V3
+    X = types.X
+    SPATIAL = types.dimensions == 3
 
     @wp.func
     def weights(f: F) -> V3:
@@ -31,7 +34,7 @@ def make_shape_functions(types: SimpleNamespace) -> SimpleNamespace:
         return V2(F(1.0) - f, f)
 
     @wp.func
-    def cell_of(x: V2, shift: F, parameters: Parameters):
+    def cell_of(x: X, shift: F, parameters: Parameters):
         """Column and row of the cell's node and the place in the cell, both in [0, 1); the grid is displaced by `shift`
         [m]."""
         sx = (x[0] - parameters.left - shift) * parameters.inverse_spacing
@@ -40,4 +43,13 @@ def make_shape_functions(types: SimpleNamespace) -> SimpleNamespace:
         j = wp.int32(sy)
         return i, j, sx - F(i), sy - F(j)
 
-    return SimpleNamespace(cell_of=cell_of, weights=weights, slopes=slopes, hats=hats)
+    @wp.func
+    def layer_of(x: X, parameters: Parameters):
+        """Layer of the cell's node and the place in it, in [0, 1)."""
+        s = F(0.0)
+        if SPATIAL:
+            s = (x[2] - parameters.front) * parameters.inverse_spacing
+        layer = wp.int32(s)
+        return layer, s - F(layer)
+
+    return SimpleNamespace(cell_of=cell_of, layer_of=layer_of, weights=weights, slopes=slopes, hats=hats)

@@ -17,20 +17,22 @@ from .layout import (
 EVEN = 0.1
 """Crowding up to which nothing is done: an even arrangement of points varies by that as it crosses the grid."""
 
-LEAST_HALF = 0.25
-"""Least volume, as a share, to which half a step takes a point: beyond, a step would turn it inside out."""
-
 
 def make_transfer(
-    types: SimpleNamespace, shapes: SimpleNamespace, pore: SimpleNamespace, bodies_of: Any, module: str
+    types: SimpleNamespace,
+    shapes: SimpleNamespace,
+    vectors: SimpleNamespace,
+    pore: SimpleNamespace,
+    bodies_of: Any,
+    module: str,
 ) -> SimpleNamespace:
     """Build the kernels `clear` (workers on the blocks in use), `forget`, `scatter` and `gather` (over points)."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2
     V3 = types.V3
-    V4 = types.V4
     V = types.V
+    X = types.X
     S = types.S
     Points = types.Points
     Grid = types.Grid
@@ -38,7 +40,14 @@ def make_transfer(
     weights = shapes.weights
     slopes = shapes.slopes
     hats = shapes.hats
-    cell_of = shapes.cell_of
+    cell_of, layer_of = shapes.cell_of, shapes.layer_of
+    per_phase, of_phases, solid_of = vectors.per_phase, vectors.of_phases, vectors.solid_of
+    on_x, on_y, on_z = vectors.on_x, vectors.on_y, vectors.on_z
+    face_x, face_y, face_z = vectors.face_x, vectors.face_y, vectors.face_z
+    trace, shear_rate, midway, section = vectors.trace, vectors.shear_rate, vectors.midway, vectors.section
+    speed_squared = vectors.speed_squared
+    SPATIAL = types.dimensions == 3
+    LAYERS, CORNER_LAYERS = (3, 2) if SPATIAL else (1, 1)
     elementary = make_elementary(types)
     read, write, add, larger = elementary.read, elementary.write, elementary.add, elementary.larger
 
@@ -53,6 +62,7 @@ def make_transfer(
         scheme.collect,
     )
     force_share, impulse_share = scheme.force_share, scheme.impulse_share
+    start_across, collect_in_space = scheme.start_across, scheme.collect_in_space
     CORNERS = effects.smoothing_grid
     DENSITY = effects.density_correction
     RELAXATION = effects.pressure_relaxation
@@ -93,7 +103,7 @@ def make_transfer(
                 grid.velocity[i, j] = V()
                 empty(grid, i, j)
                 if LIQUID_ALONE:
-                    grid.liquid_alone[i, j] = V2()
+                    grid.liquid_alone[i, j] = X()
                 if POROSITY:
                     grid.drag[i, j] = F(0.0)
                     if BEYOND:
@@ -115,6 +125,18 @@ def make_transfer(
             if wp.atomic_cas(grid.block, bi, bj, 0, 1) == 0:
                 place = wp.atomic_add(grid.active_count, 0, 1)
                 grid.active[place] = block
+
+    @wp.func
+    def mark_around(grid: Grid, ci: wp.int32, cj: wp.int32, first_block: wp.int32, parameters: Parameters):
+        """Mark the blocks of a layer that hold the nodes around one; `first_block` is the layer's."""
+        left = first_block + ((ci - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = first_block + ((ci + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        low = (cj - 1) >> wp.static(BLOCK_SHIFT)
+        high = (cj + 1) >> wp.static(BLOCK_SHIFT)
+        mark(grid, left + low, parameters)
+        mark(grid, right + low, parameters)
+        mark(grid, left + high, parameters)
+        mark(grid, right + high, parameters)
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
@@ -139,27 +161,24 @@ def make_transfer(
         volume = larger(read(points.volume, p), parameters.grain_share * reference)
         stress = read(points.stress, p)
         mass = reference * parameters.solid_density
-        masses = V()
+        liquid_mass = F(0.0)
         if TWO_PHASE:
             liquid_mass = reference * parameters.liquid_density
-            masses = V(mass, mass, liquid_mass, liquid_mass)
-        else:
-            masses = V(mass, mass)
+        masses = per_phase(mass, liquid_mass)
         time_step = F(book.clock[wp.static(TIME_STEP)])
-        gravity = V()
-        if TWO_PHASE:
-            gravity = V(parameters.gravity[0], parameters.gravity[1], parameters.gravity[0], parameters.gravity[1])
-        else:
-            gravity = V(parameters.gravity[0], parameters.gravity[1])
+        gravity = of_phases(parameters.gravity, parameters.gravity)
 
-        left = ((ci - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-        right = ((ci + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-        low = (cj - 1) >> wp.static(BLOCK_SHIFT)
-        high = (cj + 1) >> wp.static(BLOCK_SHIFT)
-        mark(grid, left + low, parameters)
-        mark(grid, right + low, parameters)
-        mark(grid, left + high, parameters)
-        mark(grid, right + high, parameters)
+        if SPATIAL:
+            cl, fz = layer_of(x, parameters)
+            first += (cl - 1) * parameters.layer
+            wz = weights(fz)
+            dz = slopes(fz)
+            to_z = V3(F(-0.5) - fz, F(0.5) - fz, F(1.5) - fz)
+            blocks = parameters.layer >> wp.static(2 * BLOCK_SHIFT)
+            for q in range(3):
+                mark_around(grid, ci, cj, (cl - 1 + q) * blocks, parameters)
+        else:
+            mark_around(grid, ci, cj, 0, parameters)
 
         pressure = F(0.0)
         if LIQUID:
@@ -179,45 +198,61 @@ def make_transfer(
         liquid_force *= per_cell
         if EXTRA_STRESS:
             stress += read(points.extra_stress, p)
-        xx = (solid_pressure - stress[0]) * push
-        yy = (solid_pressure - stress[1]) * push
-        xy = -stress[3] * push
-        # Force on a node: force_x times the weight's slope (per cell) along x, plus force_y times that along y.
-        force_x = V()
-        force_y = V()
-        if TWO_PHASE:
-            force_x = V(xx, xy, liquid_force, F(0.0))
-            force_y = V(xy, yy, F(0.0), liquid_force)
-        else:
-            force_x = V(xx, xy)
-            force_y = V(xy, yy)
+        # Force on a node: force_x times the weight's slope (per cell) along x, plus force_y times that along y, ...
+        force_x = of_phases(face_x(stress, solid_pressure, push), on_x(liquid_force))
+        force_y = of_phases(face_y(stress, solid_pressure, push), on_y(liquid_force))
         momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
         to_y = V3(F(-0.5) - fy, F(0.5) - fy, F(1.5) - fy)
 
-        # What depends on x alone is formed once per column of nodes.
-        for k in range(3):
-            column_momentum = column(wx[k], dx[k], to_x[k], momentum, force_x, change_x)
-            column_force = dx[k] * force_x
-            column_slope = wx[k] * force_y
-            column_change = wx[k] * change_y
-            column_mass = wx[k] * mass
-            for m in range(3):
-                node = first + k * parameters.rows + m
-                add(grid.mass, node, wy[m] * column_mass)
-                if POROSITY:
-                    # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that is not kept.
-                    ratio = n / parameters.porosity
-                    if CONDUCTIVITY:
-                        add(grid.drag, node, wy[m] * column_mass * ratio * ratio * resisting)
-                        if BEYOND:
-                            # n^3 rho_L C_F / sqrt(kappa)
-                            beyond = ratio * ratio * ratio * wp.sqrt(resisting)
-                            add(grid.drag_beyond, node, wy[m] * column_mass * beyond)
-                    else:
-                        add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
-                deposit(grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope)
+        if SPATIAL:
+            force_z = of_phases(face_z(stress, solid_pressure, push), on_z(liquid_force))
+            change_z = start_across(points, p, masses, parameters)
+
+        # What depends on z alone is formed once per layer of nodes, what depends on x once per column.
+        for q in range(wp.static(LAYERS)):
+            layer = first
+            layer_mass = mass
+            layer_momentum = momentum
+            layer_force_x = force_x
+            layer_force_y = force_y
+            layer_change_x = change_x
+            layer_change_y = change_y
+            if SPATIAL:
+                layer = first + q * parameters.layer
+                layer_mass = wz[q] * mass
+                layer_momentum = column(wz[q], dz[q], to_z[q], momentum, force_z, change_z)
+                layer_force_x = wz[q] * force_x
+                layer_force_y = wz[q] * force_y
+                layer_force_z = dz[q] * force_z
+                layer_change_x = wz[q] * change_x
+                layer_change_y = wz[q] * change_y
+            for k in range(3):
+                column_momentum = column(wx[k], dx[k], to_x[k], layer_momentum, layer_force_x, layer_change_x)
+                column_force = dx[k] * layer_force_x
+                if SPATIAL:
+                    column_force += wx[k] * layer_force_z
+                column_slope = wx[k] * layer_force_y
+                column_change = wx[k] * layer_change_y
+                column_mass = wx[k] * layer_mass
+                for m in range(3):
+                    node = layer + k * parameters.rows + m
+                    add(grid.mass, node, wy[m] * column_mass)
+                    if POROSITY:
+                        # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that changes.
+                        ratio = n / parameters.porosity
+                        if CONDUCTIVITY:
+                            add(grid.drag, node, wy[m] * column_mass * ratio * ratio * resisting)
+                            if BEYOND:
+                                # n^3 rho_L C_F / sqrt(kappa)
+                                beyond = ratio * ratio * ratio * wp.sqrt(resisting)
+                                add(grid.drag_beyond, node, wy[m] * column_mass * beyond)
+                        else:
+                            add(grid.drag, node, wy[m] * column_mass * ratio * ratio)
+                    deposit(
+                        grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope
+                    )
 
         if ALONE_OF_MIXTURE:
             rubbed = wp.bool(False)
@@ -228,7 +263,7 @@ def make_transfer(
             else:
                 for body in range(bodies.count):
                     if read(bodies.rubs, body) == 1:
-                        seen = x
+                        seen = section(x)
                         if MOVING:
                             moved = bodies.displacement[body]
                             seen -= V2(F(moved[0]), F(moved[1]))
@@ -245,12 +280,19 @@ def make_transfer(
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
                 alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio
                 share = impulse_share(time_step)
-                along_x = V2(alone, F(0.0)) - share * force_x
-                along_y = V2(F(0.0), alone) - share * force_y
-                for k in range(3):
-                    for m in range(3):
-                        excess = (dx[k] * wy[m]) * along_x + (wx[k] * dy[m]) * along_y
-                        add(grid.liquid_alone, first + k * parameters.rows + m, excess)
+                along_x = on_x(alone) - share * solid_of(force_x)
+                along_y = on_y(alone) - share * solid_of(force_y)
+                if SPATIAL:
+                    along_z = on_z(alone) - share * solid_of(force_z)
+                for q in range(wp.static(LAYERS)):
+                    for k in range(3):
+                        for m in range(3):
+                            node = first + k * parameters.rows + m
+                            excess = (dx[k] * wy[m]) * along_x + (wx[k] * dy[m]) * along_y
+                            if SPATIAL:
+                                node += q * parameters.layer
+                                excess = wz[q] * excess + (dz[q] * wx[k] * wy[m]) * along_z
+                            add(grid.liquid_alone, node, excess)
 
     @wp.func
     def mean(w: V3, low: V, middle: V, high: V) -> V:
@@ -266,12 +308,23 @@ def make_transfer(
         return first + w[1] * middle + last, last - first, slope
 
     @wp.func
-    def speed_squared(velocity: V) -> wp.float64:
-        """Of the faster phase [m2/s2]."""
-        result = velocity[0] * velocity[0] + velocity[1] * velocity[1]
-        if TWO_PHASE:
-            result = larger(result, velocity[2] * velocity[2] + velocity[3] * velocity[3])
-        return wp.float64(result)
+    def around(grid: Grid, first: wp.int32, wx: V3, wy: V3, fx: F, fy: F, parameters: Parameters):
+        """Of the velocity at the nine nodes of a layer: mean, first moments along x and y, slopes along them."""
+        # Along each of the three columns of nodes first, then across.
+        second = first + parameters.rows
+        third = second + parameters.rows
+        left, left_lean, left_slope = line(
+            wy, fy, read(grid.velocity, first), read(grid.velocity, first + 1), read(grid.velocity, first + 2)
+        )
+        centre, centre_lean, centre_slope = line(
+            wy, fy, read(grid.velocity, second), read(grid.velocity, second + 1), read(grid.velocity, second + 2)
+        )
+        right, right_lean, right_slope = line(
+            wy, fy, read(grid.velocity, third), read(grid.velocity, third + 1), read(grid.velocity, third + 2)
+        )
+        smooth, lean_x, slope_x = line(wx, fx, left, centre, right)
+        lean_y = mean(wx, left_lean, centre_lean, right_lean)
+        return smooth, lean_x, lean_y, slope_x, mean(wx, left_slope, centre_slope, right_slope)
 
     @wp.kernel(module=module)
     def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
@@ -287,62 +340,50 @@ def make_transfer(
         wx = weights(fx)
         wy = weights(fy)
 
-        # Along each of the three columns of nodes first, then across.
-        second = first + parameters.rows
-        third = second + parameters.rows
-        left, left_lean, left_slope = line(
-            wy, fy, read(grid.velocity, first), read(grid.velocity, first + 1), read(grid.velocity, first + 2)
-        )
-        centre, centre_lean, centre_slope = line(
-            wy, fy, read(grid.velocity, second), read(grid.velocity, second + 1), read(grid.velocity, second + 2)
-        )
-        right, right_lean, right_slope = line(
-            wy, fy, read(grid.velocity, third), read(grid.velocity, third + 1), read(grid.velocity, third + 2)
-        )
-        smooth, lean_x, slope_x = line(wx, fx, left, centre, right)
-        along_x = slope_x * parameters.inverse_spacing
-        along_y = mean(wx, left_slope, centre_slope, right_slope) * parameters.inverse_spacing
-
         # Moments about the point, not about the middle node.
-        lean_x += (F(0.5) - fx) * smooth
-        lean_y = mean(wx, left_lean, centre_lean, right_lean) + (F(0.5) - fy) * smooth
-        velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
-        fastest = speed_squared(velocity)
+        if SPATIAL:
+            cl, fz = layer_of(x, parameters)
+            first += (cl - 1) * parameters.layer
+            wz = weights(fz)
+            second = first + parameters.layer
+            third = second + parameters.layer
+            front, front_x, front_y, front_dx, front_dy = around(grid, first, wx, wy, fx, fy, parameters)
+            middle, middle_x, middle_y, middle_dx, middle_dy = around(grid, second, wx, wy, fx, fy, parameters)
+            back, back_x, back_y, back_dx, back_dy = around(grid, third, wx, wy, fx, fy, parameters)
+            smooth, lean_z, slope_z = line(wz, fz, front, middle, back)
+            along_x = mean(wz, front_dx, middle_dx, back_dx) * parameters.inverse_spacing
+            along_y = mean(wz, front_dy, middle_dy, back_dy) * parameters.inverse_spacing
+            along_z = slope_z * parameters.inverse_spacing
+            lean_x = mean(wz, front_x, middle_x, back_x) + (F(0.5) - fx) * smooth
+            lean_y = mean(wz, front_y, middle_y, back_y) + (F(0.5) - fy) * smooth
+            lean_z += (F(0.5) - fz) * smooth
+            velocity = collect_in_space(
+                points, p, grid, first, wx, wy, wz, smooth, lean_x, lean_y, lean_z, time_step, parameters
+            )
+            gradient, liquid_divergence = midway(along_x, along_y, along_z, time_step)
+        else:
+            smooth, lean_x, lean_y, slope_x, slope_y = around(grid, first, wx, wy, fx, fy, parameters)
+            along_x = slope_x * parameters.inverse_spacing
+            along_y = slope_y * parameters.inverse_spacing
+            lean_x += (F(0.5) - fx) * smooth
+            lean_y += (F(0.5) - fy) * smooth
+            velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
+            gradient, liquid_divergence = midway(along_x, along_y, time_step)
+        fastest = wp.float64(speed_squared(velocity))
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
         if fastest > book.clock[wp.static(SPEED_MAX)]:
             wp.atomic_max(book.clock, wp.static(SPEED_MAX), fastest)
 
-        # The points move by v dt with the velocity that they have now, which is that of the middle of the step. Its
-        # gradient there is L (I + dt L / 2)^-1 of the gradient L at the places where the step began (Hughes and
-        # Winget 1980): volume and rotation are then those of the points' own motion, to second order.
-        half = F(0.5) * time_step
-        determinant = along_x[0] * along_y[1] - along_y[0] * along_x[1]
-        trace = along_x[0] + along_y[1]
-        ratio = F(1.0) / larger(F(1.0) + half * (trace + half * determinant), F(wp.static(LEAST_HALF)))
-        xx = ratio * (along_x[0] + half * determinant)
-        yy = ratio * (along_y[1] + half * determinant)
-        xy = ratio * along_y[0]
-        yx = ratio * along_x[1]
-        # Gradient entries: dvx/dx, dvx/dy, dvy/dx, dvy/dy of the solid.
-        write(points.gradient, p, V4(xx, xy, yx, yy))
-        divergence = xx + yy
-        liquid_divergence = F(0.0)
-        if TWO_PHASE:
-            # The liquid's own gradient, in the places to which the solid takes the points.
-            liquid_trace = along_x[2] + along_y[3]
-            product = along_x[0] * along_x[2] + along_y[0] * along_x[3] + along_x[1] * along_y[2]
-            product += along_y[1] * along_y[3]
-            liquid_divergence = ratio * (liquid_trace + half * (trace * liquid_trace - product))
+        write(points.gradient, p, gradient)
+        divergence = trace(gradient)
         if OWN_DIVERGENCE:
             write(points.liquid_divergence, p, liquid_divergence)
         if DENSITY:
             # Beyond what a regular arrangement of points varies by, crowding counts as compression (of both phases), at
             # the rate of the shearing that brings it about; the corners' averages keep the pressures smooth.
-            stretch = xx - yy
-            shear = xy + yx
             squeeze = (
                 parameters.density_correction
-                * wp.sqrt(stretch * stretch + shear * shear)
+                * shear_rate(gradient)
                 * larger(read(points.crowding, p) - F(wp.static(EVEN)), F(0.0))
             )
             divergence -= squeeze
@@ -359,17 +400,23 @@ def make_transfer(
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
                 excess = pressure_at(read(points.liquid_strain, p), parameters)
                 excess -= parameters.true_liquid_density * wp.dot(parameters.gravity, x)
-            for k in range(2):
-                for m in range(2):
-                    h = hx[k] * hy[m] * reference
-                    corner = first + k * parameters.rows + m
-                    if TWO_PHASE:
-                        sums = S(h, h * divergence, h * excess, h * residual, h * liquid_divergence)
-                        add(grid.corner, corner, sums)
-                    elif LIQUID:
-                        add(grid.corner, corner, S(h, h * divergence, h * excess, h * residual))
-                    else:
-                        add(grid.corner, corner, S(h, h * divergence))
+            if SPATIAL:
+                hz = hats(fz)
+            for q in range(wp.static(CORNER_LAYERS)):
+                for k in range(2):
+                    for m in range(2):
+                        h = hx[k] * hy[m] * reference
+                        corner = first + k * parameters.rows + m
+                        if SPATIAL:
+                            h *= hz[q]
+                            corner += q * parameters.layer
+                        if TWO_PHASE:
+                            sums = S(h, h * divergence, h * excess, h * residual, h * liquid_divergence)
+                            add(grid.corner, corner, sums)
+                        elif LIQUID:
+                            add(grid.corner, corner, S(h, h * divergence, h * excess, h * residual))
+                        else:
+                            add(grid.corner, corner, S(h, h * divergence))
 
     kernels = SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from analytic.force_record import END_SHARE, FILTER_WINDOW, RESIDUAL_SHARE, SETTLED_SHARE, START_SHARE
 
-from .quantity import Quantity
+from .quantity import FORCE, IMPULSE, MOMENT, VOLUME, Quantity
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Figure(Quantity):
         return f"{self.short or self.symbol or self.words} [{self.shown_unit}]"
 
 
-FORCE = ("impact_force_x",)
+ON_FACE = ("impact_force_x",)
 
 
 def _time(of: str, when: str) -> Figure:
@@ -57,17 +57,17 @@ _ROWS = (
         number=False,
     ),
     Figure(
-        "peak_force", "N/m",
+        "peak_force", FORCE,
         "greatest horizontal force on the impacted face, each value a mean over one interval of the series; "
         "where force_still_rises, that so far, at least",
-        "peak force", needs=FORCE,
+        "peak force", needs=ON_FACE,
     ),
     Figure("peak_force_time", "s", "time of peak_force: end of the interval", "time of the peak"),
     Figure(
-        "peak_force_filtered", "N/m",
+        "peak_force_filtered", FORCE,
         f"greatest moving mean over {FILTER_WINDOW:g} s of the horizontal force on the impacted face; where "
         "force_still_rises, that so far, at least",
-        f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=FORCE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
+        f"peak force F₂ₓ, {FILTER_WINDOW:g} s mean", needs=ON_FACE, short=f"peak F₂ₓ, {FILTER_WINDOW:g} s mean",
     ),
     _time("peak_force_filtered", _MIDDLE),
     Figure(
@@ -78,15 +78,15 @@ _ROWS = (
     ),
     Figure(
         "impact_start_time", "s", f"start of the first interval whose force exceeds {START_SHARE:.0%} of peak_force",
-        "impact from", needs=FORCE,
+        "impact from", needs=ON_FACE,
     ),
     Figure(
         "rise_time", "s", "T1: peak_force_filtered_time less impact_start_time; null where force_still_rises",
-        "rise time", "T₁", needs=FORCE,
+        "rise time", "T₁", needs=ON_FACE,
     ),
     Figure(
-        "residual_force", "N/m", f"mean force over the last {RESIDUAL_SHARE:.0%} of the run", "residual force",
-        needs=FORCE,
+        "residual_force", FORCE, f"mean force over the last {RESIDUAL_SHARE:.0%} of the run", "residual force",
+        needs=ON_FACE,
     ),
     Figure(
         "impact_end_time", "s",
@@ -97,18 +97,18 @@ _ROWS = (
         f"{END_SHARE:.0%} of that peak in as long as the impact has lasted",
     ),
     Figure(
-        "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=FORCE,
+        "impact_duration", "s", "T2: impact_end_time less impact_start_time", "impact duration", "T₂", needs=ON_FACE,
     ),
     Figure(
-        "impulse", "N s/m",
+        "impulse", IMPULSE,
         "time integral of the horizontal force on the impacted face over the whole run; in the rows of barriers that "
         "is face_impulse, and impulse the one on the whole barrier, crest and back included",
-        "impulse", needs=FORCE,
+        "impulse", needs=ON_FACE,
     ),
     Figure(
-        "impact_impulse", "N s/m",
+        "impact_impulse", IMPULSE,
         "time integral of the horizontal force on the impacted face from impact_start_time to impact_end_time",
-        "impulse until T₂", needs=FORCE,
+        "impulse until T₂", needs=ON_FACE,
     ),
     Figure(
         "barrier_velocity_max", "m/s", "greatest velocity downstream; 0 of a barrier that only slides upstream",
@@ -131,16 +131,16 @@ _ROWS = (
         "peak_force_height", "m",
         "height above the barrier's base at which the horizontal force on the impacted face acts at "
         "peak_force_filtered_time, of its moving mean",
-        "height of the peak force", "h_F", needs=(*FORCE, "impact_force_height"),
+        "height of the peak force", "h_F", needs=(*ON_FACE, "impact_force_height"),
     ),
     Figure(
-        "toe_moment_filtered", "N m/m",
+        "toe_moment_filtered", MOMENT,
         f"greatest moment of the flow on the barrier about its toe, of the moving mean over {FILTER_WINDOW:g} s",
         f"greatest moment about the toe, {FILTER_WINDOW:g} s mean", "M_toe", needs=("toe_moment",),
     ),
     _time("toe_moment_filtered", _MIDDLE),
     Figure(
-        "heel_moment_filtered", "N m/m",
+        "heel_moment_filtered", MOMENT,
         f"greatest moment of the flow that overturns the barrier about its heel, of the moving mean over "
         f"{FILTER_WINDOW:g} s; its own weight is not counted; null of a wall, which has no heel",
         f"greatest moment about the heel, {FILTER_WINDOW:g} s mean", "M_heel", needs=("heel_moment",),
@@ -199,27 +199,27 @@ _ROWS = (
         "greatest pore pressure of a point", needs=("pore_pressure_max_anywhere",),
     ),
     _time("pore_pressure_max_anywhere", "that of the sample"),
-    Figure("initial_volume", "m3/m", "volume of what is there at the start, deposits included"),
-    Figure("left_volume", "m3/m", "what has left the domain until the end, at the flow's initial density"),
+    Figure("initial_volume", VOLUME, "volume of what is there at the start, deposits included"),
+    Figure("left_volume", VOLUME, "what has left the domain until the end, at the flow's initial density"),
     Figure(
-        "retained_volume", "m3/m", "material upstream of the crest at the end, at the flow's initial density",
+        "retained_volume", VOLUME, "material upstream of the crest at the end, at the flow's initial density",
         "volume retained", short="retained",
     ),
     Figure(
-        "on_crest_volume", "m3/m", "material above the crest at the end", "volume on the crest",
+        "on_crest_volume", VOLUME, "material above the crest at the end", "volume on the crest",
         short="on the crest",
     ),
     Figure(
-        "overtopped_volume", "m3/m",
+        "overtopped_volume", VOLUME,
         "material beyond the crest at the end that did not lie there as a deposit at the start; left_volume is what "
         "has left the domain",
         "volume overtopped", short="beyond",
     ),
     Figure(
-        "inflow_volume", "m3/m", "what has arrived at the section of the inflow until the end, at the flow's density",
+        "inflow_volume", VOLUME, "what has arrived at the section of the inflow until the end, at the flow's density",
         "volume that has arrived", short="arrived", needs=("inflow_mass",),
     ),
-    Figure("deposited_volume", "m3/m", "what lay there at the start as a deposit", "volume deposited before"),
+    Figure("deposited_volume", VOLUME, "what lay there at the start as a deposit", "volume deposited before"),
     Figure(
         "mass_error", "-",
         "greatest change of the mass of both phases, inside and departed together, over the initial mass",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .quantity import Quantity
+from .quantity import MASS, VOLUME, Quantity
 
 Array = NDArray[np.float64]
 
@@ -24,9 +24,9 @@ POINT_FIELDS: Mapping[str, Quantity] = {
         Quantity("pore_pressure", "Pa", "pore pressure p_L, compression positive"),
         Quantity("porosity", "-", "volume of the voids over the total volume, n"),
         Quantity("deviatoric_strain", "-", "cumulative deviatoric strain, ε_d", "cumulative deviatoric strain"),
-        Quantity("volume", "m3/m", "volume of the material point"),
-        Quantity("solid_mass", "kg/m", "mass of solid of the material point"),
-        Quantity("liquid_mass", "kg/m", "mass of liquid of the material point"),
+        Quantity("volume", VOLUME, "volume of the material point"),
+        Quantity("solid_mass", MASS, "mass of solid of the material point"),
+        Quantity("liquid_mass", MASS, "mass of liquid of the material point"),
     )
 }
 """Point arrays of a snapshot, beside the positions."""

@@ -6,23 +6,46 @@ This module and the table of the time series need nothing but Python: the unit `
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+IN_THE_PLANE, IN_SPACE = 2, 3
+"""Dimensions that a simulation may have."""
+
+
+def of_width(unit: str, dimensions: int = IN_THE_PLANE) -> str:
+    """Unit of what grows with the width of a scene: in the plane it is per metre of that.
+
+    >>> of_width("kN")
+    'kN/m'
+    """
+    return f"{unit}/m" if dimensions == IN_THE_PLANE else unit
+
+
+_OF_WIDTH = ("N", "N s", "N m", "J", "kg", "m3")
+FORCE, IMPULSE, MOMENT, ENERGY, MASS, VOLUME = map(of_width, _OF_WIDTH)
+"""Units of forces, impulses, moments, energies, masses and volumes in the plane."""
 
 SHOWN_UNITS = {
-    "N/m": ("kN/m", 1e-3),
-    "N s/m": ("kN s/m", 1e-3),
-    "N m/m": ("kN m/m", 1e-3),
-    "J/m": ("kJ/m", 1e-3),
     "Pa": ("kPa", 1e-3),
-    "m3/m": ("m³/m", 1.0),
+    **{
+        of_width(unit, dimensions): (of_width(shown, dimensions), factor)
+        for dimensions in (IN_THE_PLANE, IN_SPACE)
+        for unit, shown, factor in (
+            ("N", "kN", 1e-3),
+            ("N s", "kN s", 1e-3),
+            ("N m", "kN m", 1e-3),
+            ("J", "kJ", 1e-3),
+            ("m3", "m³", 1.0),
+        )
+    },
 }
 """Units in which people read a quantity, with the factor from SI; any other unit is shown as it is."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity in SI units, per metre of width where it is extensive."""
+    """A quantity in SI units, in the plane; `in_dimensions` is that of another space."""
 
     name: str
     """In files and in Python."""
@@ -40,6 +63,11 @@ class Quantity:
     def heading(self) -> str:
         """Name with unit, as in the header of a column: `impact_force_x [N/m]`."""
         return f"{self.name} [{self.unit}]"
+
+    def in_dimensions(self, dimensions: int) -> Self:
+        """The same with its unit there: in space nothing is per metre of width."""
+        whole = {of_width(unit): of_width(unit, dimensions) for unit in _OF_WIDTH}
+        return replace(self, unit=whole.get(self.unit, self.unit))
 
     @property
     def words(self) -> str:

@@ -9,9 +9,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from .quantity import Quantity, Sampled
+from .quantity import ENERGY, FORCE, IMPULSE, MASS, MOMENT, Quantity, Sampled
 
 Reader = Callable[[Any], float]
+
+AXES = "xyz"
+"""Of the components of a vector; in the plane there are the first two."""
 
 
 def barrier(scenario: Any) -> bool:
@@ -55,7 +58,7 @@ def pressed_by_liquid(scenario: Any) -> bool:
 
 
 def _force(surface: str, axis: str) -> Reader:
-    place = "xy".index(axis)
+    place = AXES.index(axis)
     return lambda now: now.forces[surface][place]
 
 
@@ -69,14 +72,15 @@ def _left(entry: str) -> Reader:
 
 def _residual(axis: str) -> Reader:
     """Momentum, less its start, gravity's and an inflow's, plus what left and what the flow gave to the bodies."""
-    place = "xy".index(axis)
+    place = AXES.index(axis)
 
     def read(now: Any) -> float:
         residual = now.ledger(f"momentum_{axis}") - now.initial_momentum[place]
-        residual -= now.balance(f"gravity_impulse_{axis}")
-        residual -= now.inflow(f"momentum_{axis}")
+        if axis != "z":  # along which neither gravity acts nor anything arrives
+            residual -= now.balance(f"gravity_impulse_{axis}")
+            residual -= now.inflow(f"momentum_{axis}")
         residual += now.left(f"momentum_{axis}")
-        return residual + sum(now.impulses[place::2])
+        return residual + sum(now.impulses[place :: len(now.initial_momentum)])
 
     return read
 
@@ -86,13 +90,13 @@ def force_of_surface(surface: str, axis: str) -> Sampled:
     meaning = f"force of the flow on {surface} along {axis}; mean over the interval"
     words = f"force on {surface} along {axis}"
     name = f"{surface}_force_{axis}"
-    return Sampled(name, "N/m", meaning, words, read=_force(surface, axis), of_points=False, mean=True)
+    return Sampled(name, FORCE, meaning, words, read=_force(surface, axis), of_points=False, mean=True)
 
 
 FURTHER = {
     "barrier_displacement": ("m", "displacement of the barrier {name} along x", "displacement of {name}"),
     "barrier_velocity": ("m/s", "velocity of the barrier {name} along x", "velocity of {name}"),
-    "barrier_work": ("J/m", "work done by the flow on the barrier {name} since t = 0", "work done on {name}"),
+    "barrier_work": (ENERGY, "work done by the flow on the barrier {name} since t = 0", "work done on {name}"),
 }
 """What is told of each further barrier that moves: unit, meaning, words; its columns are `NAME_barrier_displacement`
 and so on."""
@@ -125,51 +129,51 @@ _ROWS = (
         read=lambda now: now.time, of_points=False,
     ),
     Sampled(
-        "impact_force_x", "N/m",
+        "impact_force_x", FORCE,
         "force of the flow on the impacted face, F_2x; mean over the interval; + pushes downstream",
         "horizontal impact force", "F₂,x", read=_force("impact", "x"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(
-        "impact_force_y", "N/m",
+        "impact_force_y", FORCE,
         "force of the flow on the impacted face along y, F_2y; mean over the interval; + lifts the barrier",
         "vertical impact force", "F₂,y", read=_force("impact", "y"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(  # the crest is level, so its force along x is the paper's F_3
-        "top_force", "N/m", "force of the flow on the crest along x, F_3; mean over the interval",
+        "top_force", FORCE, "force of the flow on the crest along x, F_3; mean over the interval",
         "friction on the crest", "F₃", key="top_force_x",
         read=_force("top", "x"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(
-        "top_force_y", "N/m", "force of the flow on the crest along y; mean over the interval; - presses on the crest",
+        "top_force_y", FORCE, "force of the flow on the crest along y; mean over the interval; - presses on the crest",
         "vertical force on the crest", read=_force("top", "y"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(
-        "back_force_x", "N/m", "force of the flow on the downstream side along x; mean over the interval",
+        "back_force_x", FORCE, "force of the flow on the downstream side along x; mean over the interval",
         "horizontal force on the downstream side",
         read=_force("back", "x"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(
-        "back_force_y", "N/m", "force of the flow on the downstream side along y; mean over the interval",
+        "back_force_y", FORCE, "force of the flow on the downstream side along y; mean over the interval",
         "vertical force on the downstream side",
         read=_force("back", "y"), there=barrier, of_points=False, mean=True,
     ),
     Sampled(
-        "ground_force_x", "N/m", "force of the flow on the ground along x, F_1; mean over the interval",
+        "ground_force_x", FORCE, "force of the flow on the ground along x, F_1; mean over the interval",
         "friction on the ground", "F₁", read=_force("ground", "x"), there=ground, of_points=False, mean=True,
     ),
     Sampled(
-        "ground_force_y", "N/m",
+        "ground_force_y", FORCE,
         "force of the flow on the ground along y; mean over the interval; - presses on the ground",
         "vertical force on the ground",
         read=_force("ground", "y"), there=ground, of_points=False, mean=True,
     ),
     Sampled(
-        "base_force", "N/m",
+        "base_force", FORCE,
         "friction of the base soil on the barrier, F_4; mean over the interval; + resists sliding",
         "friction at the base", "F₄", read=lambda now: now.base_force, there=sliding, of_points=False, mean=True,
     ),
     Sampled(
-        "base_normal_force", "N/m", "force with which the barrier presses on its base; mean over the interval",
+        "base_normal_force", FORCE, "force with which the barrier presses on its base; mean over the interval",
         "normal force at the base", read=lambda now: now.base_normal_force, there=sliding, of_points=False, mean=True,
     ),
     Sampled(
@@ -180,13 +184,13 @@ _ROWS = (
         read=lambda now: now.loads.height_of("impact", now.forces["impact"][0]),
     ),
     Sampled(
-        "toe_moment", "N m/m",
+        "toe_moment", MOMENT,
         "moment of the flow on the whole barrier about its toe; mean over the interval; + turns it downstream",
         "moment about the toe", "M_toe", read=lambda now: now.loads.toe_moment, there=barrier,
         of_points=False, of_loads=True, mean=True,
     ),
     Sampled(
-        "heel_moment", "N m/m",
+        "heel_moment", MOMENT,
         "moment of the flow on the whole barrier about its heel; mean over the interval; + overturns it",
         "moment about the heel", "M_heel", there=ended_barrier, of_points=False, of_loads=True, mean=True,
         read=lambda now: now.loads.heel_moment(sum(now.forces[name][1] for name in ("impact", "top", "back"))),
@@ -232,34 +236,34 @@ _ROWS = (
         read=lambda now: now.barrier.displacement, there=barrier, of_points=False,
     ),
     Sampled(
-        "flow_kinetic_energy", "J/m", "kinetic energy of both phases of the flow, E_k1",
+        "flow_kinetic_energy", ENERGY, "kinetic energy of both phases of the flow, E_k1",
         "kinetic energy of the flow", "Eₖ₁", read=_sum("kinetic"),
     ),
     Sampled(
-        "flow_gravitational_energy", "J/m", "potential energy of the flow, zero at the origin",
+        "flow_gravitational_energy", ENERGY, "potential energy of the flow, zero at the origin",
         "potential energy of the flow", read=_sum("gravitational"),
     ),
     Sampled(
-        "flow_elastic_energy", "J/m", "elastic energy of the skeleton and the liquid",
+        "flow_elastic_energy", ENERGY, "elastic energy of the skeleton and the liquid",
         "elastic energy of the flow", read=_sum("elastic"),
     ),
     Sampled(
         # Liquid is carried at the skeleton's points, so that its own fall through the voids is in no potential energy.
-        "seepage_work", "J/m",
+        "seepage_work", ENERGY,
         "work of gravity since t = 0 on liquid that moves through the skeleton, whose place in the potential energy is "
         "the skeleton's",
         "work of gravity on seepage", read=lambda now: now.balance("seepage_work"), there=two_phases, of_points=False,
     ),
     Sampled(
-        "barrier_kinetic_energy", "J/m", "kinetic energy of the barrier, E_k2", "kinetic energy of the barrier", "Eₖ₂",
+        "barrier_kinetic_energy", ENERGY, "kinetic energy of the barrier, E_k2", "kinetic energy of the barrier", "Eₖ₂",
         read=lambda now: now.barrier.kinetic_energy, there=sliding, of_points=False,
     ),
     Sampled(
-        "barrier_work", "J/m", "work done by the flow on the barrier since t = 0", "work done on the barrier",
+        "barrier_work", ENERGY, "work done by the flow on the barrier since t = 0", "work done on the barrier",
         read=lambda now: now.barrier.work, there=barrier, of_points=False,
     ),
     Sampled(
-        "base_friction_work", "J/m", "work that friction at the barrier's base has taken since t = 0",
+        "base_friction_work", ENERGY, "work that friction at the barrier's base has taken since t = 0",
         "work taken by base friction", read=lambda now: now.barrier.base_work, there=sliding, of_points=False,
     ),
     Sampled(
@@ -280,63 +284,63 @@ _ROWS = (
         read=lambda now: math.sqrt(now.ledger("speed_max")),
     ),
     Sampled(
-        "solid_mass", "kg/m", "mass of solid in the domain", "mass of solid", read=_sum("solid_mass"),
+        "solid_mass", MASS, "mass of solid in the domain", "mass of solid", read=_sum("solid_mass"),
     ),
     Sampled(
-        "liquid_mass", "kg/m", "mass of liquid in the domain", "mass of liquid",
+        "liquid_mass", MASS, "mass of liquid in the domain", "mass of liquid",
         read=_sum("liquid_mass"), there=two_phases,
     ),
     Sampled(
-        "momentum_x", "N s/m", "momentum of the flow along x", "horizontal momentum of the flow",
+        "momentum_x", IMPULSE, "momentum of the flow along x", "horizontal momentum of the flow",
         read=_sum("momentum_x"),
     ),
     Sampled(
-        "momentum_y", "N s/m", "momentum of the flow along y", "vertical momentum of the flow", read=_sum("momentum_y"),
+        "momentum_y", IMPULSE, "momentum of the flow along y", "vertical momentum of the flow", read=_sum("momentum_y"),
     ),
     Sampled(
-        "momentum_residual_x", "N s/m", "momentum along x, less its start, less all recorded impulses",
+        "momentum_residual_x", IMPULSE, "momentum along x, less its start, less all recorded impulses",
         "horizontal momentum not accounted for", read=_residual("x"),
     ),
     Sampled(
-        "momentum_residual_y", "N s/m", "momentum along y, less its start, less all recorded impulses",
+        "momentum_residual_y", IMPULSE, "momentum along y, less its start, less all recorded impulses",
         "vertical momentum not accounted for", read=_residual("y"),
     ),
     Sampled(
-        "left_mass", "kg/m", "mass of both phases that has left the domain since t = 0", "mass that left the domain",
+        "left_mass", MASS, "mass of both phases that has left the domain since t = 0", "mass that left the domain",
         read=lambda now: now.left("solid_mass") + now.left("liquid_mass"), of_points=False,
     ),
     Sampled(
-        "left_momentum_x", "N s/m", "momentum along x that has left the domain with the mass",
+        "left_momentum_x", IMPULSE, "momentum along x that has left the domain with the mass",
         "horizontal momentum that left the domain", read=_left("momentum_x"), of_points=False,
     ),
     Sampled(
-        "left_momentum_y", "N s/m", "momentum along y that has left the domain with the mass",
+        "left_momentum_y", IMPULSE, "momentum along y that has left the domain with the mass",
         "vertical momentum that left the domain",
         read=_left("momentum_y"), of_points=False,
     ),
     Sampled(
-        "left_energy", "J/m", "kinetic, potential and elastic energy that has left the domain with the mass",
+        "left_energy", ENERGY, "kinetic, potential and elastic energy that has left the domain with the mass",
         "energy that left the domain", read=_left("energy"), of_points=False,
     ),
     Sampled(
-        "inflow_mass", "kg/m", "mass of both phases that has arrived at the section of the inflow since t = 0",
+        "inflow_mass", MASS, "mass of both phases that has arrived at the section of the inflow since t = 0",
         "mass that has arrived", read=lambda now: now.inflow("solid_mass") + now.inflow("liquid_mass"), there=arriving,
         of_points=False,
     ),
     Sampled(
-        "inflow_momentum_x", "N s/m",
+        "inflow_momentum_x", IMPULSE,
         "momentum along x that the inflow has brought since t = 0, with its mass and by its thrust at the section",
         "horizontal momentum that has arrived", read=lambda now: now.inflow("momentum_x"), there=arriving,
         of_points=False,
     ),
     Sampled(
-        "inflow_momentum_y", "N s/m",
+        "inflow_momentum_y", IMPULSE,
         "momentum along y that the inflow has given to the flow since t = 0, through the section",
         "vertical momentum that has arrived", read=lambda now: now.inflow("momentum_y"), there=arriving,
         of_points=False,
     ),
     Sampled(
-        "inflow_energy", "J/m",
+        "inflow_energy", ENERGY,
         "kinetic and potential energy that the inflow has brought since t = 0, and the work of its thrust",
         "energy that has arrived", read=lambda now: now.inflow("energy"), there=arriving, of_points=False,
     ),
@@ -345,6 +349,36 @@ _ROWS = (
         read=lambda now: now.time_step, of_points=False,
     ),
 )  # fmt: skip
+
+IN_SPACE: Mapping[str, Sampled] = {
+    row.key: row
+    for row in (
+        force_of_surface("ground", "z"),
+        Sampled(
+            "momentum_z",
+            IMPULSE,
+            "momentum of the flow along z",
+            "momentum of the flow across",
+            read=_sum("momentum_z"),
+        ),
+        Sampled(
+            "momentum_residual_z",
+            IMPULSE,
+            "momentum along z, less its start, less all recorded impulses",
+            "momentum across not accounted for",
+            read=_residual("z"),
+        ),
+        Sampled(
+            "left_momentum_z",
+            IMPULSE,
+            "momentum along z that has left the domain with the mass",
+            "momentum across that left the domain",
+            read=_left("momentum_z"),
+            of_points=False,
+        ),
+    )
+}
+"""What there is besides in a simulation of three dimensions."""
 
 TIME_SERIES: Mapping[str, Sampled] = {row.key: row for row in _ROWS}
 """Columns of `timeseries.csv`, by their keys in the simulation's samples."""

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 class PointField:
     """One quantity, by the name under which the kernels find it in `points`."""
 
-    kind: Literal["scalar", "V2", "V4", "V"] = "scalar"
-    """Two numbers, four as in a plane tensor, or as many as a place has velocity components in all phases."""
+    kind: Literal["scalar", "X", "T", "V", "V2", "V4"] = "scalar"
+    """A place (or a velocity), a symmetric tensor, all velocities at a place; V2 and V4 are two and four numbers in any
+    dimensions."""
     start: float | Callable[[Any, Any], ArrayLike] = 0.0
     """At t = 0: one number for all, or a function of the scenario and of its material points (`MaterialPoints`)."""
     meaning: str = ""

@@ -57,7 +57,7 @@ def point_arrays(
     count = len(initial.volume)
     given: dict[str, Any] = {
         "position": initial.position,
-        "velocity": np.tile(initial.velocity, (1, types.components // 2)),
+        "velocity": np.tile(initial.velocity, (1, types.components // types.dimensions)),
         "stress": initial.effective_stress,
         "reference_volume": initial.volume,
         "volume": initial.volume,
@@ -69,11 +69,10 @@ def point_arrays(
         given |= {"material": initial.material, "materials": materials}
     if effects.liquid:
         given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
-    for owner in (effects.skeleton, effects.scheme):
-        for name, field in owner.point_fields.items():
-            start = field.start(scenario, initial) if callable(field.start) else field.start
-            shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
-            given[name] = np.ascontiguousarray(np.broadcast_to(start, shape))
+    for name, field in effects.point_fields.items():
+        start = field.start(scenario, initial) if callable(field.start) else field.start
+        shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
+        given[name] = np.ascontiguousarray(np.broadcast_to(start, shape))
     return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
 
 
@@ -100,8 +99,8 @@ def grid_arrays(
     bodies: Sequence[Body], effects: Effects, types: SimpleNamespace, grid: GridLayout, *, device: Any
 ) -> Group:
     """Nodes, corners of the smoothing grid, and the list of blocks in use."""
-    blocks = (grid.columns // at.BLOCK, grid.rows // at.BLOCK)
-    shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.columns, grid.rows))
+    blocks = (grid.layers * grid.columns // at.BLOCK, grid.rows // at.BLOCK)
+    shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.layers * grid.columns, grid.rows))
     shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 2}
     given: dict[str, Any] = {}
     if effects.bodies and not effects.passing:
@@ -134,7 +133,7 @@ def clock_arrays(
         "running": wp.zeros(at.RUNNING_SIZE, dtype=wp.int32, device=device),
         "balance": wp.array(balance, dtype=wp.float64, device=device),
         "limiters": wp.zeros(at.LIMITERS_SIZE, dtype=wp.float64, device=device),
-        "reactions": wp.zeros(2 * surfaces, dtype=wp.float64, device=device),
-        "left": wp.zeros(at.LEFT_SIZE, dtype=wp.float64, device=device),
+        "reactions": wp.zeros(effects.dimensions * surfaces, dtype=wp.float64, device=device),
+        "left": wp.zeros(at.LEFT_SIZE + effects.dimensions - 2, dtype=wp.float64, device=device),
         "sums": wp.zeros(at.LEDGER_SIZE, dtype=wp.float64, device=device),
     }

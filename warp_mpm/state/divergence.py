@@ -27,8 +27,7 @@ class SimulationDiverged(RuntimeError):  # noqa: N818 - a state of the run, not 
 
 def diverging(effects: Effects) -> dict[str, str]:
     """Arrays of the material points in which a divergence shows, those of the law and of the scheme last."""
-    own = {**effects.skeleton.point_fields, **effects.scheme.point_fields}
-    return NAMES | {name: field.meaning for name, field in own.items() if field.meaning}
+    return NAMES | {name: field.meaning for name, field in effects.point_fields.items() if field.meaning}
 
 
 def what_is_no_number(name: str, value: float, *, time: float, steps: int, scenario: Scenario) -> str:

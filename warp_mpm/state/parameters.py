@@ -64,7 +64,7 @@ def material_parameters(
 def _filled(types: SimpleNamespace, values: dict[str, Any]) -> Any:
     parameters = types.Parameters()
     for name, value in values.items():
-        setattr(parameters, name, types.V2(*value) if isinstance(value, tuple) else value)
+        setattr(parameters, name, types.X(*value) if isinstance(value, tuple) else value)
     return parameters
 
 
@@ -81,11 +81,12 @@ def _grid_and_clock(
         "rows": grid.rows,
         "block_rows": grid.rows // at.BLOCK,
         "workers": workers,
-        "gravity": scenario.gravity.vector,
+        "gravity": (*scenario.gravity.vector, 0.0)[: effects.dimensions],
         "wave_speed": limits.wave_speed,
         "courant_number": numerics.courant_number,
         "largest_stable_step": limits.largest_step,
         "largest_stable_step_counter": at.LIMIT_LAW if limits.law_step < limits.drag_step else at.LIMIT_DRAG,
+        **({"front": grid.front, "layers": grid.layers, "layer": grid.columns * grid.rows} if grid.layers > 1 else {}),
     } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.speed)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..kernels import layout as at
 from ..quantities import TIME_SERIES, Sampled, force_of_surface, further_quantities, quantities_of
-from ..quantities.time_series import OWN
+from ..quantities.time_series import IN_SPACE, OWN
 from ..scenario import Scenario
 from ..simulator.bodies import Body
 
@@ -115,8 +115,8 @@ class Now:
     """[s]."""
     elapsed: float
     """Time over which forces are means [s]."""
-    forces: Mapping[str, tuple[float, float]]
-    """Mean force of the flow on each surface, and on each body of several, along x and y, by its name [N/m]."""
+    forces: Mapping[str, tuple[float, ...]]
+    """Mean force of the flow on each surface, and on each body of several, along the axes, by its name [N/m]."""
     base_force: float
     """Mean friction at the base of a sliding barrier, against its motion [N/m]."""
     loads: Any
@@ -156,7 +156,7 @@ class Now:
         return max(-self.barrier.mass * self.scenario.gravity.vector[1] - vertical, 0.0)
 
 
-def sampled_quantities(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, Sampled]:
+def sampled_quantities(scenario: Scenario, bodies: Sequence[Body], dimensions: int) -> dict[str, Sampled]:
     """What a sample of a scene tells, by key: of the table, of a script, and forces on the surfaces of its bodies."""
     further = further_quantities(scenario)
     found = {key: TIME_SERIES.get(key) or further.get(key) or OWN[key] for key in quantities_of(scenario)}
@@ -165,7 +165,10 @@ def sampled_quantities(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, 
             for axis in ("x", "y"):
                 if not body.edge:
                     found.setdefault(f"{surface.name}_force_{axis}", force_of_surface(surface.name, axis))
-    return found
+    if dimensions == 2:
+        return found
+    there = {key: row for key, row in IN_SPACE.items() if not key.startswith("ground") or scenario.ground is not None}
+    return {key: row.in_dimensions(dimensions) for key, row in (found | there).items()}
 
 
 def wanted_quantities(known: Mapping[str, Sampled], names: Collection[str] | None) -> list[Sampled]:
@@ -174,16 +177,17 @@ def wanted_quantities(known: Mapping[str, Sampled], names: Collection[str] | Non
     return [one for key, one in known.items() if names is None or key in names or not (one.of_points or one.of_loads)]
 
 
-def mean_forces(bodies: Sequence[Body], now: Window, since: Window) -> tuple[dict[str, tuple[float, float]], float]:
+def mean_forces(bodies: Sequence[Body], now: Window, since: Window) -> tuple[dict[str, tuple[float, ...]], float]:
     """Mean force [N/m] on each surface and on each body of several by name, and at the base, between two windows:
     impulse over time."""
     elapsed = now.time - since.time
     rate = 1.0 / elapsed if elapsed > 0.0 else 0.0
     means = [(after - before) * rate for after, before in zip(now.reactions, since.reactions, strict=True)]
     surfaces = [surface.name for body in bodies for surface in body.surfaces]
-    forces = {name: (means[2 * place], means[2 * place + 1]) for place, name in enumerate(surfaces)}
+    each = zip(surfaces, np.reshape(means, (len(surfaces), -1)).tolist() if surfaces else (), strict=True)
+    forces: dict[str, tuple[float, ...]] = {name: tuple(force) for name, force in each}
     for body in bodies:
         if len(body.surfaces) > 1:
-            x, y = zip(*(forces[surface.name] for surface in body.surfaces), strict=True)
-            forces.setdefault(body.name, (sum(x), sum(y)))
+            along = zip(*(forces[surface.name] for surface in body.surfaces), strict=True)
+            forces.setdefault(body.name, tuple(map(sum, along)))
     return forces, -(now.base_impulse - since.base_impulse) * rate

@@ -203,6 +203,8 @@ def contact_arrays(
         "block": block,
         "start": start,
     }
+    if effects.dimensions == 3:
+        given["weight_z"] = places.weight_z
     if effects.joined:
         slides = np.array([isinstance(body.motion, Sliding) for body in bodies])[together.chosen(order).body]
         abreast = [slides[a:b].sum() for a, b in pairwise(colour)]

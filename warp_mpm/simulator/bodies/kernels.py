@@ -81,16 +81,16 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
     return fields
 
 
-def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str, Any]:
+def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, R: Any) -> dict[str, Any]:
     """Fields of the structure `Contact`: C places of contact of all bodies, first those that stand alone."""
     array = wp.array
     fields: dict[str, Any] = {
         "body": array(dtype=wp.int32),
         "surface": array(dtype=wp.int32),
-        "position": array(dtype=V2),  # at t = 0 [m]
-        "normal": array(dtype=V2),
+        "position": array(dtype=X),  # at t = 0 [m]
+        "normal": array(dtype=X),
         "fixed": array(dtype=wp.int32),  # 1: the nodes are always the same
-        "first": array(dtype=wp.int32),  # lowest of the 3 x 3 nodes, counted through; -1: outside the grid
+        "first": array(dtype=wp.int32),  # lowest of the 3 x 3 (x 3) nodes, counted through; -1: outside the grid
         "weight_x": array(dtype=V3),
         "weight_y": array(dtype=V3),
         "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
@@ -103,6 +103,8 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
         "block": array(dtype=wp.int32),  # [groups] of those that stand alone
         "start": array(dtype=wp.int32),  # [groups + 1]
     }
+    if effects.dimensions == 3:
+        fields["weight_z"] = array(dtype=V3)
     if effects.joined:
         fields |= {
             "colours": wp.int32,  # of joined places; those of one colour share no node
@@ -120,7 +122,7 @@ def contact_fields(effects: Effects, scalar: Any, V2: Any, V3: Any) -> dict[str,
         # Neighbours along the piece, or the place itself.
         fields["before"] = array(dtype=wp.int32)
         fields["after"] = array(dtype=wp.int32)
-        fields["rubbed"] = array(dtype=scalar)  # on the solid along the surface,
+        fields["rubbed"] = array(dtype=R)  # on the solid along the surface,
         if effects.liquid:
             fields["alone"] = array(dtype=scalar)  # on liquid that fills the volume, as it would move alone
     return fields

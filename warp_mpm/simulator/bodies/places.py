@@ -26,9 +26,13 @@ from warp_mpm.kernels.layout import BLOCK
 
 from .body import Body, Driven, Sliding
 from .outline import ENDLESS, Array, Segments
+from .side import Side
 
 PER_CELL = 2.0
 """Points of a surface per side of a cell."""
+
+SINGLE, DOUBLE = np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 0.0])
+"""Weights of the middle node alone, and of a mirrored pair."""
 
 ROWS = 2.0
 """Cells behind a piece along the grid in which nodes act: no point gets deeper."""
@@ -39,9 +43,10 @@ class Places:
     """C places of contact of all bodies."""
 
     position: NDArray[np.float64]
-    """[C, 2] at t = 0 [m]."""
+    """[C, 2] at t = 0 [m]; in space [C, 3], as normals are."""
     first: NDArray[np.int32]
-    """[C] lowest of the 3 x 3 nodes, counted through; -1 where it follows from the position in every step."""
+    """[C] lowest of the 3 x 3 nodes, in space of 3 x 3 x 3, counted through; -1 where it follows from the position in
+    every step."""
     weight_x: NDArray[np.float64]
     """[C, 3]"""
     weight_y: NDArray[np.float64]
@@ -54,6 +59,8 @@ class Places:
     """[C]"""
     length: NDArray[np.float64]
     """[C] of the surface for which it stands [m]; 0 of nodes further back."""
+    weight_z: NDArray[np.float64]
+    """[C, 3] in space, else [C, 0]."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -84,6 +91,65 @@ def places_of(bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool])
                 found.append(_pairs(body, number, grid, on_grid))
         others = [b for k, b in enumerate(bodies) if k != number and not passing[number] and not passing[k]]
         found.append(_points(body, number, grid, ~on_grid, others, passing[number]))
+    places = Places.together(found)
+    return places if grid.layers == 1 else _in_space(places, bodies, grid)
+
+
+def _in_space(section: Places, bodies: Sequence[Body], grid: GridLayout) -> Places:
+    """Those of the section in every layer that has one on either side, and those of the sides."""
+    layers = np.arange(1, grid.layers - 1)
+    found = []
+    for number, body in enumerate(bodies):
+        if isinstance(body.outline, Side):
+            found.append(_of_side(body.outline, number, grid))
+            continue
+        own = section.chosen(section.body == number)
+        count, times = len(own), len(layers)
+        z = np.repeat(grid.front + (layers + 0.5) * grid.spacing, count)
+        first = np.tile(own.first, times) + np.repeat((layers - 1) * grid.columns * grid.rows, count)
+        found.append(
+            Places(
+                np.column_stack([np.tile(own.position, (times, 1)), z]),
+                first.astype(np.int32),
+                np.tile(own.weight_x, (times, 1)),
+                np.tile(own.weight_y, (times, 1)),
+                np.column_stack([np.tile(own.normal, (times, 1)), np.zeros(len(z))]),
+                np.tile(own.piece, times),
+                np.tile(own.body, times),
+                np.tile(own.length, times),
+                np.tile(SINGLE, (len(z), 1)),
+            )
+        )
+    return Places.together(found)
+
+
+def _of_side(side: Side, number: int, grid: GridLayout) -> Places:
+    """Mirrored pairs of nodes at a plane across z, and the nodes a row further back, as `_pairs`."""
+    x, y = grid.node_positions()
+    columns, rows = np.meshgrid(np.arange(1, grid.columns - 1), np.arange(1, grid.rows - 1), indexing="ij")
+    i, j = columns.ravel(), rows.ravel()
+    found = []
+    for layer in range(1, grid.layers - 1):
+        z = grid.front + (layer + 0.5) * grid.spacing
+        distance = (z - side.z) * side.facing / grid.spacing
+        if not -ROWS < distance < 0.0:
+            continue
+        paired = distance > -1.0
+        lowest = min(layer, layer + side.facing) if paired else layer - 1
+        count = len(i)
+        found.append(
+            Places(
+                np.column_stack([x[i], y[j], np.full(count, z)]),
+                ((lowest * grid.columns + i - 1) * grid.rows + j - 1).astype(np.int32),
+                np.tile(SINGLE, (count, 1)),
+                np.tile(SINGLE, (count, 1)),
+                np.tile([0.0, 0.0, float(side.facing)], (count, 1)),
+                np.zeros(count, dtype=np.int32),
+                np.full(count, number, dtype=np.int32),
+                np.zeros(count),
+                np.tile(DOUBLE if paired else SINGLE, (count, 1)),
+            )
+        )
     return Places.together(found)
 
 
@@ -100,10 +166,14 @@ def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: S
     first = np.where(free, i * grid.rows + j, first)
     offset = (np.arange(3)[:, None] * grid.rows + np.arange(3)[None, :]).ravel()
     acts = (places.weight_x[:, :, None] * places.weight_y[:, None, :]).reshape(-1, 9) != 0.0
+    if grid.layers > 1:
+        offset = (np.arange(3)[:, None] * grid.columns * grid.rows + offset).ravel()
+        acts = (places.weight_z[:, :, None] * acts[:, None, :]).reshape(-1, 27) != 0.0
     acts[free] = True
     node = first[:, None] + offset
-    inside = acts & (node >= 0) & (node < grid.columns * grid.rows)
-    count = np.bincount(node[inside], minlength=grid.columns * grid.rows)
+    nodes = grid.layers * grid.columns * grid.rows
+    inside = acts & (node >= 0) & (node < nodes)
+    count = np.bincount(node[inside], minlength=nodes)
     shared = (inside & (count[np.clip(node, 0, len(count) - 1)] > 1)).any(axis=1)
     whole = np.array([isinstance(body.motion, Sliding) or len(body.outline.segments) > 1 for body in bodies])
     return shared | whole[places.body] | free
@@ -135,16 +205,16 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
     # The middle one of three is the node; with its mirror image, the first two or the last two.
     along_x, along_y = paired & (step[:, 0] != 0), paired & (step[:, 1] != 0)
     first = low - np.stack([~along_x, ~along_y], axis=1)
-    single, double = np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 0.0])
     return Places(
         place[node[:, 0], node[:, 1]],
         (first[:, 0] * grid.rows + first[:, 1]).astype(np.int32),
-        np.where(along_x[:, None], double, single),
-        np.where(along_y[:, None], double, single),
+        np.where(along_x[:, None], DOUBLE, SINGLE),
+        np.where(along_y[:, None], DOUBLE, SINGLE),
         normal,
         piece.astype(np.int32),
         np.full(len(node), number, dtype=np.int32),
         np.where(paired, grid.spacing, 0.0),
+        np.zeros((len(node), 0)),
     )
 
 
@@ -186,6 +256,7 @@ def _points(
         of,
         np.full(count, number, dtype=np.int32),
         np.concatenate(length),
+        np.zeros((count, 0)),
     )
 
 
@@ -239,7 +310,9 @@ def _free_stretches(
 def by_block(places: Places, grid: GridLayout) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.int32]]:
     """An order of the places by the block of the grid that holds their first node, those blocks, and where each one's
     places begin."""
-    i, j = places.first // grid.rows, places.first % grid.rows
+    # In space the first node lies a layer before those that act.
+    first = places.first + (grid.columns * grid.rows if grid.layers > 1 else 0)
+    i, j = first // grid.rows, first % grid.rows
     blocks = ((i + 1) // BLOCK) * (grid.rows // BLOCK) + (j + 1) // BLOCK
     order = np.argsort(blocks, kind="stable")
     block, start = np.unique(blocks[order], return_index=True)

@@ -13,11 +13,13 @@ from warp_mpm.grid import GridLayout
 from .body import Body
 from .kernels import DEEP, RUBBED, RUBS
 from .outline import Segments
+from .side import Side
 
 
 def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells: float = 0.0) -> NDArray[np.float64]:
     """Volume [columns, rows] of the cell around each corner of the grid that is open to flow [m3/m], at least an
-    eighth of a cell, with the bodies where they lie at t = 0. Sampled at 8 x 8 places where an outline is near.
+    eighth of a cell, with the bodies where they lie at t = 0. Sampled at 8 x 8 places where an outline is near. In
+    space [layers columns, rows] [m3].
 
     Pieces that do not lie along the grid count as `depth_in_cells` further back: points rest that deep in them.
     """
@@ -44,6 +46,13 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
         for solid in solids:
             free &= solid.nearest_within(place.reshape(-1, 2), 4.0 * spacing)[0].reshape(free.shape) > 0.0
         share[corner[:, 0], corner[:, 1]] = free.mean(axis=1)
+    if grid.layers > 1:
+        z = grid.front + (np.arange(grid.layers) + 1.0) * spacing
+        between = np.ones(grid.layers)
+        for body in bodies:
+            if isinstance(body.outline, Side):
+                between *= np.clip((z - body.outline.z) * body.outline.facing / spacing + 0.5, 0.0, 1.0)
+        return (np.maximum(between[:, None, None] * share, 0.125) * spacing**3).reshape(-1, grid.rows)
     return np.maximum(share, 0.125) * spacing**2
 
 

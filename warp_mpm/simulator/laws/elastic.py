@@ -10,6 +10,7 @@ class Elastic(Law):
     """A skeleton that is elastic, whatever it bears."""
 
     name = "elastic"
+    dimensions = (2, 3)
     title = "linear elastic, without a bound on the stress"
 
 
@@ -26,6 +27,9 @@ def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
         """exp(strain), the ratio of the volumes, as a quotient that is positive for every strain."""
         even = F(12.0) + strain * strain
         return (even + F(6.0) * strain) / (even - F(6.0) * strain)
+
+    if types.dimensions == 3:
+        return SimpleNamespace(trial_stress=_trial_stress_in_space(types, volume_ratio), volume_ratio=volume_ratio)
 
     @wp.func
     def trial_stress(stress: V4, gradient: V4, volume_strain: F, time_step: F, parameters: Parameters):
@@ -69,14 +73,62 @@ def make_elasticity(types: SimpleNamespace) -> SimpleNamespace:
     return SimpleNamespace(trial_stress=trial_stress, volume_ratio=volume_ratio)
 
 
+def _trial_stress_in_space(types: SimpleNamespace, volume_ratio: Any) -> Any:
+    """Build `trial_stress` in space; of a plane rotation it is that of the plane."""
+    import warp as wp
+
+    from warp_mpm.kernels.vectors import make_vectors
+
+    F, X, T, G, Parameters = types.scalar, types.X, types.T, types.G, types.Parameters
+    M: Any = wp.types.matrix((3, 3), F)
+    trace, squares = make_vectors(types).trace, make_vectors(types).squares
+
+    @wp.func
+    def trial_stress(stress: T, gradient: G, volume_strain: F, time_step: F, parameters: Parameters):
+        third = volume_strain / F(3.0)
+        even = third - time_step * trace(gradient) / F(3.0)
+        half = F(0.5) * time_step
+        strain = T(
+            even + time_step * gradient[0],
+            even + time_step * gradient[4],
+            even + time_step * gradient[8],
+            half * (gradient[1] + gradient[3]),
+            half * (gradient[5] + gradient[7]),
+            half * (gradient[2] + gradient[6]),
+        )
+        # Rotation about a, by 2 atan |a|: I + 2 (A + A²) / (1 + a²), A b = a x b.
+        a = F(0.5) * half * X(gradient[7] - gradient[5], gradient[2] - gradient[6], gradient[3] - gradient[1])
+        skew = M(F(0.0), -a[2], a[1], a[2], F(0.0), -a[0], -a[1], a[0], F(0.0))
+        turn = wp.identity(n=3, dtype=F) + (F(2.0) / (F(1.0) + wp.dot(a, a))) * (skew + skew * skew)
+        before = M(
+            stress[0], stress[3], stress[5],
+            stress[3], stress[1], stress[4],
+            stress[5], stress[4], stress[2],
+        )  # fmt: skip
+        turned = turn * before * wp.transpose(turn)
+        keep = F(1.0) / volume_ratio(volume_strain)
+        over_step = F(12.0) / (F(12.0) + F(6.0) * volume_strain + volume_strain * volume_strain)
+        lame = parameters.lame * volume_strain * over_step
+        double = F(2.0) * parameters.shear_modulus * over_step
+        trial = keep * T(turned[0, 0], turned[1, 1], turned[2, 2], turned[0, 1], turned[1, 2], turned[0, 2])
+        trial += T(lame, lame, lame, F(0.0), F(0.0), F(0.0)) + double * strain
+        deviator = strain - T(third, third, third, F(0.0), F(0.0), F(0.0))
+        return trial, wp.sqrt(F(wp.static(2.0 / 3.0)) * squares(deviator))
+
+    return trial_stress
+
+
 def make_stored_energy(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
     """Build the function `stored`, the energy that an elastic skeleton gives back."""
     import warp as wp
 
+    from warp_mpm.kernels.vectors import make_vectors
+
     F = types.scalar
-    V4 = types.V4
+    T = types.T
     Parameters = types.Parameters
     larger = tools.larger
+    squares = make_vectors(types).squares
     one = wp.constant(wp.float64(1.0))
 
     @wp.func
@@ -111,10 +163,9 @@ def make_stored_energy(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
         return result
 
     @wp.func
-    def stored(stress: V4, volume: F, grains: F, parameters: Parameters) -> wp.float64:
+    def stored(stress: T, volume: F, grains: F, parameters: Parameters) -> wp.float64:
         trace = stress[0] + stress[1] + stress[2]
-        squares = stress[0] * stress[0] + stress[1] * stress[1] + stress[2] * stress[2]
-        deviatoric = squares + F(2.0) * stress[3] * stress[3] - trace * trace * F(wp.static(1.0 / 3.0))
+        deviatoric = squares(stress) - trace * trace * F(wp.static(1.0 / 3.0))
         bulk = wp.float64(parameters.bulk_modulus)
         strain = wp.float64(-trace * F(wp.static(1.0 / 3.0))) / bulk
         # Shear stress s at the volume V was s V / V_0 before the volume changed, which does no work on it.

@@ -29,6 +29,8 @@ class Law:
     """What it is, in a clause, with its source."""
     Settings: ClassVar[type[Model]] = Model
     """Its fields in `flow.material`, with limits and docstrings."""
+    dimensions: ClassVar[tuple[int, ...]] = (2,)
+    """In how many it works: 3 too, where its functions take `types.T` and `types.G` in place of V4."""
     point_fields: ClassVar[Mapping[str, PointField]] = {}
     """What a point stores for it."""
     constants: ClassVar[tuple[str, ...]] = ()
@@ -132,7 +134,8 @@ class Law:
 
         `types` holds the scalar type, the vectors V2, V3, V4, the structures Points and Parameters, and in `effects`
         what there is; `tools` the functions `read(array, p)`, `write(array, p, value)`, `larger` and `smaller`.
-        A tensor is V4: xx, yy, zz, xy; the velocity gradient dvx/dx, dvx/dy, dvy/dx, dvy/dy [1/s].
+        A tensor is V4: xx, yy, zz, xy; the velocity gradient dvx/dx, dvx/dy, dvy/dx, dvy/dy [1/s]. A law that works
+        in space too names them `types.T` and `types.G`, of which the components stand in `kernels/vectors.py`.
 
         - `trial(points, p, stress: V4, gradient: V4, volume_strain, time_step, parameters) -> V4, scalar`: stress after
           an elastic step, and the deviatoric strain of the step [-]. `volume_strain` is what the skeleton bears of it.
@@ -155,7 +158,7 @@ def all_functions(law: Law, types: SimpleNamespace, tools: SimpleNamespace) -> d
 
     from .elastic import make_elasticity, make_stored_energy
 
-    F, V4 = types.scalar, types.V4
+    F, T, G = types.scalar, types.T, types.G
     Points, Parameters = types.Points, types.Parameters
 
     elasticity = make_elasticity(types)
@@ -165,8 +168,8 @@ def all_functions(law: Law, types: SimpleNamespace, tools: SimpleNamespace) -> d
     def trial(
         points: Points,
         p: wp.int32,
-        stress: V4,
-        gradient: V4,
+        stress: T,
+        gradient: G,
         volume_strain: F,
         time_step: F,
         parameters: Parameters,
@@ -174,12 +177,12 @@ def all_functions(law: Law, types: SimpleNamespace, tools: SimpleNamespace) -> d
         return trial_stress(stress, gradient, volume_strain, time_step, parameters)
 
     @wp.func
-    def back(points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters):
+    def back(points: Points, p: wp.int32, stress: T, gradient: G, volume: F, time_step: F, parameters: Parameters):
         return stress, F(0.0)
 
     @wp.func
-    def extra(points: Points, p: wp.int32, stress: V4, gradient: V4, time_step: F, parameters: Parameters) -> V4:
-        return V4()
+    def extra(points: Points, p: wp.int32, stress: T, gradient: G, time_step: F, parameters: Parameters) -> T:
+        return T()
 
     @wp.func
     def leave(points: Points, p: wp.int32):

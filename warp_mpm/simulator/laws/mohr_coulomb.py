@@ -13,6 +13,7 @@ from warp_mpm.schema import Model, NonNegative
 
 from .dilatancy import angle_at_rest, greatest_angle, make_dilatancy
 from .law import Array, Law
+from .principal import make_principal
 
 
 class Settings(Model):
@@ -41,6 +42,7 @@ class MohrCoulomb(Law):
     name = "mohr_coulomb"
     title = "non-associative Mohr–Coulomb with a tension cut-off (the paper's)"
     Settings = Settings
+    dimensions = (2, 3)
     opens = True
     dilates = True
     constants = (
@@ -106,15 +108,13 @@ class MohrCoulomb(Law):
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
 
-        F, V4, Points, Parameters = types.scalar, types.V4, types.Points, types.Parameters
+        F, T, G, Points, Parameters = types.scalar, types.T, types.G, types.Points, types.Parameters
         if types.effects.dilatancy:
             return {"back": _make_dilatant(types, tools)}
         return_mapping = make_return_mapping(types, tools)
 
         @wp.func
-        def back(
-            points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters
-        ):
+        def back(points: Points, p: wp.int32, stress: T, gradient: G, volume: F, time_step: F, parameters: Parameters):
             return return_mapping(stress, parameters)
 
         return {"back": back}
@@ -193,9 +193,9 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace, constant
     where T is at most the apex c cot phi, so that the apex of the cone is the apex of the cut-off. Regions: plane, two
     edges, one, two or three tension planes, cone and cut-off together with their two corners.
 
-    The function takes the trial stress (xx, yy, zz, xy) [Pa] and the parameters, or another structure `constants`,
-    whose fields `yield_constants` makes; it returns the stress on or inside the surface and the opening, the plastic
-    volume strain due to the cut-off alone, over the volume after it [-].
+    The function takes the trial stress (xx, yy, zz, xy; in space yz and xz too) [Pa] and the parameters, or another
+    structure `constants`, whose fields `yield_constants` makes; it returns the stress on or inside the surface and the
+    opening, the plastic volume strain due to the cut-off alone, over the volume after it [-].
     Where most points yield, branches cost more than arithmetic: the cone is free of them.
     """
     import warp as wp
@@ -238,6 +238,24 @@ def make_return_mapping(types: SimpleNamespace, tools: SimpleNamespace, constant
             m = (stiff * (s[2] - low) - y.lame * (s[0] - limit)) * inverse
             r = V3(limit, larger(smaller(s[1] - y.lame * a - y.flow_side * m, limit), low), low)
         return r
+
+    if types.dimensions == 3:
+        T = types.T
+        of_space = make_principal(types)
+        principal, composed = of_space.principal, of_space.composed
+
+        @wp.func
+        def return_mapping_in_space(stress: T, y: Constants):
+            s1, s2, s3, n1, n2, n3 = principal(stress)
+            s = V3(s1, s2, s3)
+            r = cone(s, y)
+            opening = F(0.0)
+            if r[0] > y.tension_limit:
+                r = cut_off(s, y)
+                opening = (s1 + s2 + s3 - r[0] - r[1] - r[2]) / (F(3.0) * y.bulk_modulus)
+            return composed(r[0], r[1], r[2], n1, n2, n3), opening
+
+        return return_mapping_in_space
 
     @wp.func
     def return_mapping(stress: V4, y: Constants):

@@ -34,6 +34,7 @@ class Aflip(Flip):
     title = "affine-augmented FLIP (Fei et al. 2021), its loss a rate"
     settings = Settings
     point_fields = Flip.point_fields | Apic.point_fields
+    point_fields_in_space = Apic.point_fields_in_space
     keeps_affine_field = True
 
     def numbers(self, numerics: Any, *, sound_speed: float, flow_speed: float) -> dict[str, float]:
@@ -45,11 +46,14 @@ class Aflip(Flip):
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
 
-        F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
+        F, V2, V3, V, X = types.scalar, types.V2, types.V3, types.V, types.X
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
         TWO_PHASE = types.effects.two_phase
-        kept, gained = make_kept(types)
+        SPATIAL = types.dimensions == 3
+        kept, gained = make_kept(types, tools)
+        solid_of, liquid_of, of_phases = tools.solid_of, tools.liquid_of, tools.of_phases
+        M: Any = wp.types.matrix((3, 3), F)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -87,6 +91,19 @@ class Aflip(Flip):
             return V2(divided, divided * rotation)
 
         @wp.func
+        def gained_around(grid: Grid, first: wp.int32, wx: V3, wy: V3, parameters: Parameters):
+            """Of the gain at the nine nodes of a layer: mean, and first moments about the middle node."""
+            # Along each of the three columns of nodes first, then across.
+            second = first + parameters.rows
+            third = second + parameters.rows
+            field = grid.increment
+            low, left_lean = line(wy, read(field, first), read(field, first + 1), read(field, first + 2))
+            middle, centre_lean = line(wy, read(field, second), read(field, second + 1), read(field, second + 2))
+            high, right_lean = line(wy, read(field, third), read(field, third + 1), read(field, third + 2))
+            increment, gain_x = line(wx, low, middle, high)
+            return increment, gain_x, wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean
+
+        @wp.func
         def collect(
             points: Points,
             p: wp.int32,
@@ -100,16 +117,9 @@ class Aflip(Flip):
             time_step: F,
             parameters: Parameters,
         ) -> V:
-            # Along each of the three columns of nodes first, then across; moments about the middle node first.
-            second = first + parameters.rows
-            third = second + parameters.rows
-            field = grid.increment
-            low, left_lean = line(wy, read(field, first), read(field, first + 1), read(field, first + 2))
-            middle, centre_lean = line(wy, read(field, second), read(field, second + 1), read(field, second + 2))
-            high, right_lean = line(wy, read(field, third), read(field, third + 1), read(field, third + 2))
-            increment, gain_x = line(wx, low, middle, high)
+            increment, gain_x, gain_y = gained_around(grid, first, wx, wy, parameters)
             gain_x -= (wx[2] - wx[0]) * increment
-            gain_y = wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean - (wy[2] - wy[0]) * increment
+            gain_y -= (wy[2] - wy[0]) * increment
 
             per_moment = F(4.0) * parameters.inverse_spacing
             share = kept(time_step, parameters)
@@ -129,18 +139,88 @@ class Aflip(Flip):
 
             new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
             write(points.velocity, p, new)
-            write(points.advection, p, V2(smooth[0], smooth[1]))
+            write(points.advection, p, solid_of(smooth))
             return new
+
+        @wp.func
+        def turned(x: X, y: X, z: X, time_step: F) -> M:
+            """The affine field C (columns: along x, y, z) of a moved point, one phase: as `turning` of the plane, with
+            C (tr C - C) in place of its determinant, and without what is of third order."""
+            c = M(x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+            square = c * c
+            trace = wp.trace(c)
+            minors = F(0.5) * (trace * trace - wp.trace(square))
+            divided = F(1.0) / (F(1.0) + time_step * (larger(trace, F(0.0)) + time_step * larger(minors, F(0.0))))
+            result = divided * c
+            if minors > F(0.0):
+                result += (divided * time_step) * (trace * c - square)
+            return result
+
+        @wp.func
+        def column_of(c: M, k: wp.int32) -> X:
+            return X(c[0, k], c[1, k], c[2, k])
+
+        @wp.func
+        def collect_in_space(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            wz: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            lean_z: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            second = first + parameters.layer
+            third = second + parameters.layer
+            front, front_x, front_y = gained_around(grid, first, wx, wy, parameters)
+            middle, middle_x, middle_y = gained_around(grid, second, wx, wy, parameters)
+            back, back_x, back_y = gained_around(grid, third, wx, wy, parameters)
+            increment, gain_z = line(wz, front, middle, back)
+            gain_x = wz[0] * front_x + wz[1] * middle_x + wz[2] * back_x - (wx[2] - wx[0]) * increment
+            gain_y = wz[0] * front_y + wz[1] * middle_y + wz[2] * back_y - (wy[2] - wy[0]) * increment
+            gain_z -= (wz[2] - wz[0]) * increment
+
+            per_moment = F(4.0) * parameters.inverse_spacing
+            share = kept(time_step, parameters)
+            x = share * read(points.affine_x, p) + per_moment * gain_x
+            y = share * read(points.affine_y, p) + per_moment * gain_y
+            z = share * read(points.affine_z, p) + per_moment * gain_z
+            solid = turned(solid_of(x), solid_of(y), solid_of(z), time_step)
+            liquid = solid
+            if TWO_PHASE:
+                liquid = turned(liquid_of(x), liquid_of(y), liquid_of(z), time_step)
+            write(points.affine_x, p, of_phases(column_of(solid, 0), column_of(liquid, 0)))
+            write(points.affine_y, p, of_phases(column_of(solid, 1), column_of(liquid, 1)))
+            write(points.affine_z, p, of_phases(column_of(solid, 2), column_of(liquid, 2)))
+
+            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
+            write(points.velocity, p, new)
+            write(points.advection, p, solid_of(smooth))
+            return new
+
+        @wp.func
+        def start_across(points: Points, p: wp.int32, masses: V, parameters: Parameters) -> V:
+            return parameters.spacing * wp.cw_mul(masses, read(points.affine_z, p))
 
         @wp.func
         def halt(points: Points, p: wp.int32):
             write(points.affine_x, p, V())
             write(points.affine_y, p, V())
+            if SPATIAL:
+                write(points.affine_z, p, V())
 
         return super().functions(types, tools) | {
             "start": start,
+            "start_across": start_across,
             "column": column,
             "deposit": deposit,
             "collect": collect,
+            "collect_in_space": collect_in_space,
             "halt": halt,
         }

@@ -47,7 +47,9 @@ class Apic(Scheme):
 
     name = "apic"
     title = "affine particle-in-cell (Jiang et al. 2015)"
+    dimensions = (2, 3)
     point_fields = {"affine_x": PointField("V"), "affine_y": PointField("V")}  # noqa: RUF012
+    point_fields_in_space = {"affine_z": PointField("V")}  # noqa: RUF012
     keeps_affine_field = True
 
     def fitted(self, places: Array, spacing: float, masses: Array, velocities: Array) -> dict[str, Array]:
@@ -59,6 +61,7 @@ class Apic(Scheme):
         F, V3, V = types.scalar, types.V3, types.V
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add = tools.read, tools.write, tools.add
+        SPATIAL = types.dimensions == 3
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -66,6 +69,10 @@ class Apic(Scheme):
             change_x = parameters.spacing * wp.cw_mul(masses, read(points.affine_x, p))
             change_y = parameters.spacing * wp.cw_mul(masses, read(points.affine_y, p))
             return momentum, change_x, change_y
+
+        @wp.func
+        def start_across(points: Points, p: wp.int32, masses: V, parameters: Parameters) -> V:
+            return parameters.spacing * wp.cw_mul(masses, read(points.affine_z, p))
 
         @wp.func
         def force_share(time_step: F) -> F:
@@ -103,16 +110,39 @@ class Apic(Scheme):
             return smooth
 
         @wp.func
+        def collect_in_space(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            wz: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            lean_z: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            write(points.affine_z, p, lean_z * (F(4.0) * parameters.inverse_spacing))
+            return collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
+
+        @wp.func
         def halt(points: Points, p: wp.int32):
             write(points.affine_x, p, V())
             write(points.affine_y, p, V())
+            if SPATIAL:
+                write(points.affine_z, p, V())
 
         return {
             "start": start,
+            "start_across": start_across,
             "force_share": force_share,
             "impulse_share": impulse_share,
             "column": column,
             "deposit": deposit,
             "collect": collect,
+            "collect_in_space": collect_in_space,
             "halt": halt,
         }

@@ -16,13 +16,14 @@ class Settings(Model):
     """With flip: share of the grid's own velocity in the update during the time in which sound crosses a cell."""
 
 
-def make_kept(types: SimpleNamespace) -> tuple[Any, Any]:
+def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]:
     """Build `kept(time_step, parameters)`, the share of its own velocity that a point keeps in a step, and `gained`,
     its velocity afterwards."""
     import warp as wp
 
     F, V, Parameters = types.scalar, types.V, types.Parameters
     TWO_PHASE = types.effects.two_phase
+    of_phases, solid_of, liquid_of = tools.of_phases, tools.solid_of, tools.liquid_of
 
     @wp.func
     def kept(time_step: F, parameters: Parameters) -> F:
@@ -37,12 +38,9 @@ def make_kept(types: SimpleNamespace) -> tuple[Any, Any]:
             # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
             decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
             unseen = own + increment - smooth
-            new = V(
-                new[0],
-                new[1],
-                new[0] + smooth[2] - smooth[0] + decay * (unseen[2] - unseen[0]),
-                new[1] + smooth[3] - smooth[1] + decay * (unseen[3] - unseen[1]),
-            )
+            solid = solid_of(new)
+            liquid = solid + liquid_of(smooth) - solid_of(smooth) + decay * (liquid_of(unseen) - solid_of(unseen))
+            new = of_phases(solid, liquid)
         return new
 
     return kept, gained
@@ -52,9 +50,10 @@ class Flip(Scheme):
     """A point adds to its velocity what the nodes gained in the step, and moves with the nodes' velocity."""
 
     name = "flip"
+    dimensions = (2, 3)
     title = "flip (Sulsky et al. 1995, the paper's)"
     settings = Settings
-    point_fields = {"advection": PointField("V2")}  # noqa: RUF012
+    point_fields = {"advection": PointField("X")}  # noqa: RUF012
     grid_fields = {"force": "V", "increment": "V"}  # noqa: RUF012
     constants = ("pic_rate",)
 
@@ -64,10 +63,11 @@ class Flip(Scheme):
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
 
-        F, V2, V3, V = types.scalar, types.V2, types.V3, types.V
+        F, V3, V, X = types.scalar, types.V3, types.V, types.X
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add = tools.read, tools.write, tools.add
-        kept, gained = make_kept(types)
+        kept, gained = make_kept(types, tools)
+        solid_of = tools.solid_of
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -131,13 +131,41 @@ class Flip(Scheme):
             share = kept(time_step, parameters)
             new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
             write(points.velocity, p, new)
-            write(points.advection, p, V2(smooth[0], smooth[1]))
+            write(points.advection, p, solid_of(smooth))
+            return new
+
+        @wp.func
+        def collect_in_space(
+            points: Points,
+            p: wp.int32,
+            grid: Grid,
+            first: wp.int32,
+            wx: V3,
+            wy: V3,
+            wz: V3,
+            smooth: V,
+            lean_x: V,
+            lean_y: V,
+            lean_z: V,
+            time_step: F,
+            parameters: Parameters,
+        ) -> V:
+            increment = V()
+            for q in range(3):
+                for k in range(3):
+                    for m in range(3):
+                        node = first + q * parameters.layer + k * parameters.rows + m
+                        increment += (wz[q] * wx[k] * wy[m]) * read(grid.increment, node)
+            share = kept(time_step, parameters)
+            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
+            write(points.velocity, p, new)
+            write(points.advection, p, solid_of(smooth))
             return new
 
         @wp.func
         def displacement(
-            points: Points, p: wp.int32, grid: Grid, x: V2, shift: F, time_step: F, parameters: Parameters
-        ) -> V2:
+            points: Points, p: wp.int32, grid: Grid, x: X, shift: F, time_step: F, parameters: Parameters
+        ) -> X:
             return time_step * read(points.advection, p)
 
         return {
@@ -151,5 +179,6 @@ class Flip(Scheme):
             "keep": keep,
             "receive": receive,
             "collect": collect,
+            "collect_in_space": collect_in_space,
             "displacement": displacement,
         }

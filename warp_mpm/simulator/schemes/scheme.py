@@ -18,9 +18,10 @@ Array = NDArray[np.float64]
 class Scheme:
     """A way of bringing velocities from the points to the nodes and back.
 
-    `types` below holds the scalar type, the vectors V2 and V (all velocities at a place) and the structures Points,
-    Grid and Parameters; `tools` the functions `read(array, p)`, `write(array, p, value)`, `add(array, p, value)`,
-    `larger`, `smaller`, `weights(f)`, `slopes(f)` and `cell_of(x, shift, parameters)`.
+    `types` below holds the scalar type, the vectors X (a place; V2 in the plane) and V (all velocities at a place) and
+    the structures Points, Grid and Parameters; `tools` the functions `read(array, p)`, `write(array, p, value)`,
+    `add(array, p, value)`, `larger`, `smaller`, `weights(f)`, `slopes(f)` and `cell_of(x, shift, parameters)`, and
+    those of `kernels.vectors`.
     """
 
     name: ClassVar[str]
@@ -31,6 +32,10 @@ class Scheme:
     """Its fields in `numerics`, each with a default, limits and a docstring."""
     point_fields: ClassVar[Mapping[str, PointField]] = {}
     """What a point stores for it."""
+    dimensions: ClassVar[tuple[int, ...]] = (2,)
+    """In how many it works: 3 too, where its functions do (`types.X` in place of `types.V2`)."""
+    point_fields_in_space: ClassVar[Mapping[str, PointField]] = {}
+    """What a point stores for it besides in space."""
     grid_fields: ClassVar[Mapping[str, str]] = {}
     """What a node stores for it: kinds as of a `PointField`."""
     constants: ClassVar[tuple[str, ...]] = ()
@@ -83,9 +88,16 @@ class Scheme:
           drag and contact, `inverse` being 1 over each phase's mass (default: the momentum has it all);
         - `keep(grid, i, j, old: V, new: V, time_step, parameters)`: velocities before and after (default: forgotten);
         - `receive(grid, i, j, change: V)`: what contact changes (default: nothing beside the velocity);
-        - `displacement(points, p, grid, x, shift, time_step, parameters) -> V2`: of a point in the step (default: with
+        - `displacement(points, p, grid, x, shift, time_step, parameters) -> X`: of a point in the step (default: with
           the solid's velocity);
         - `halt(points, p)`: empties its point fields where the velocity is given anew (default: it has none to empty).
+
+        In space, where `dimensions` has 3, the part along z comes first, by `column` again, and needed are
+
+        - `start_across(points, p, masses: V, parameters) -> V`: by how much the momentum changes from one node to the
+          next along z (default: not at all);
+        - `collect_in_space(points, p, grid, first, wx, wy, wz, smooth, lean_x, lean_y, lean_z, time_step, parameters)
+          -> V`: as `collect`.
         """
         raise NotImplementedError
 
@@ -102,9 +114,9 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
     """The functions of a scheme, defaults filled in."""
     import warp as wp
 
-    F, V2, V = types.scalar, types.V2, types.V
+    F, V, X = types.scalar, types.V, types.X
     Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
-    read = tools.read
+    read, solid_of = tools.read, tools.solid_of
 
     @wp.func
     def clear(grid: Grid, i: wp.int32, j: wp.int32):
@@ -124,10 +136,13 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
 
     @wp.func
     def displacement(
-        points: Points, p: wp.int32, grid: Grid, x: V2, shift: F, time_step: F, parameters: Parameters
-    ) -> V2:
-        v = read(points.velocity, p)
-        return time_step * V2(v[0], v[1])
+        points: Points, p: wp.int32, grid: Grid, x: X, shift: F, time_step: F, parameters: Parameters
+    ) -> X:
+        return time_step * solid_of(read(points.velocity, p))
+
+    @wp.func
+    def start_across(points: Points, p: wp.int32, masses: V, parameters: Parameters) -> V:
+        return V()
 
     @wp.func
     def halt(points: Points, p: wp.int32):
@@ -140,5 +155,7 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
         "receive": receive,
         "displacement": displacement,
         "halt": halt,
+        "start_across": start_across,
+        "collect_in_space": None,
     }
     return defaults | scheme.functions(types, tools)
