@@ -45,7 +45,7 @@ def main() -> None:
 def run(
     scenario_files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="SCENARIO...", help="Scenario files (JSON); several run at once.", show_default=False),
+        typer.Argument(metavar="SCENARIO", help="Scenario files (JSON); several run at once.", show_default=False),
     ] = None,
     out: Annotated[
         Path | None,
