@@ -209,7 +209,7 @@ _ROWS = (
     ),
     Figure(
         "overtopped_volume", "m3/m",
-        "material beyond the crest at the end, without what has left the domain (left_volume)",
+        "material beyond the crest at the end; left_volume is what has left the domain",
         "volume overtopped", short="beyond",
     ),
     Figure(
