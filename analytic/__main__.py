@@ -1,6 +1,7 @@
 """`python -m analytic`, and the installed command `warp-mpm-analytic`."""
 
 import sys
+from pathlib import Path
 
 
 def main() -> None:
@@ -14,4 +15,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    # Python has put the working folder first, where a user's own file would stand in for another of our packages.
+    if Path(sys.path[0]) == Path.cwd() != Path(__file__).resolve().parents[1]:
+        sys.path.append(sys.path.pop(0))
     main()

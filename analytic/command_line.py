@@ -179,7 +179,7 @@ class CommandLine(TyperGroup):
         if said and not problems:
             unreadable = re.fullmatch(r"\w+ (['\"])(.*)\1 is not readable\.", said)
             return f"{unreadable[2]} cannot be read: Permission denied." if unreadable else said
-        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name).rstrip(".")
+        name = self._typed.get(parameter.name) or (parameter.metavar or parameter.name)
         value = f"= {problems[0]['input']} is not allowed" if problems else "is missing"
         return f"{name} {value}; it must be {self.allowed(parameter)}."
 

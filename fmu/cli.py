@@ -111,7 +111,7 @@ def check(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[FILE]...",
+            metavar="FILE",
             help="Archives (.fmu), which are proved, and scenarios (.json), on which the closed-form unit is compared "
             "with the simulation.",
             show_default="all units, freshly built",

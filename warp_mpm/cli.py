@@ -47,7 +47,7 @@ def main() -> None:
 def run(
     scenario_files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="SCENARIO...", help="Scenario files (JSON); several run at once.", show_default=False),
+        typer.Argument(metavar="SCENARIO", help="Scenario files (JSON); several run at once.", show_default=False),
     ] = None,
     out: Annotated[
         Path | None,
@@ -136,7 +136,10 @@ def run(
     scenario_file, ended_before = scenario_files[0] if scenario_files else None, False
     if resume is not None:
         if scenario_file is not None or out is not None or spacing is not None or until is not None or force:
-            _refuse("--resume DIR goes on with a run as it was begun; beside it only --device and --quiet are allowed.")
+            _refuse(
+                "--resume DIR goes on with a run as it was begun; it takes no scenario, --out, --spacing, --until or "
+                "--force."
+            )
         folder, (scenario, ended_before) = resume, _run_in(resume)
     elif scenario_file is None:
         _refuse("run needs a scenario file, or --resume DIR to go on with an interrupted run.")

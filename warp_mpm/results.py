@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from warp_mpm.extras import missing
 from warp_mpm.quantities import SUMMED_UP, Quantity, quantity_of_column
-from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.figures import NUMBERS
 from warp_mpm.quantities.points import POINT_FIELDS, POSITION
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.recording import run_folder
@@ -56,7 +56,7 @@ RECORD_KINDS: dict[str, tuple[type, ...]] = {
 _NUMBER = (int, float, NoneType)
 
 SUMMARY_KINDS: dict[str, tuple[type, ...]] = {
-    **{name: _NUMBER for name, figure in FIGURES.items() if figure.number},
+    **dict.fromkeys(NUMBERS, _NUMBER),
     **dict.fromkeys(("force_still_rises", "barrier_at_rest"), (bool, NoneType)),
     **dict.fromkeys(("title", "status", "time_step_limit", "mechanism"), (str, NoneType)),
     **dict.fromkeys(("definitions", "mechanism_measures", "not_recorded", "verdict"), (dict, NoneType)),

@@ -15,7 +15,7 @@ def calibrate(
     records: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN_DIR...", help="Run folders of the simulator, or CSV files with --scenario.", show_default=False
+            metavar="RUN_DIR", help="Run folders of the simulator, or CSV files with --scenario.", show_default=False
         ),
     ],
     scenario: Annotated[

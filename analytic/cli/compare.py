@@ -34,7 +34,7 @@ SIMULATED = "simulated"
 def compare(
     paths: Annotated[
         list[Path],
-        typer.Argument(metavar="PATH...", help="Run folders of the simulator, or scenario files.", show_default=False),
+        typer.Argument(metavar="PATH", help="Run folders of the simulator, or scenario files.", show_default=False),
     ],
     variant: Annotated[
         list[str] | None,

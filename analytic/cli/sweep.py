@@ -45,7 +45,7 @@ def plan(
 
 @sweep.command(epilog="Example: python -m analytic sweep collect sweep/runs/* --out docs/data/sweep.csv")
 def collect(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders.", show_default=False)],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR", help="Run folders.", show_default=False)],
     out: Annotated[Path, typer.Option(help="CSV file to write.", show_default=False)],
     remark: Annotated[str, typer.Option(help="First line of the file, as a comment.")] = "",
 ) -> None:

@@ -66,6 +66,13 @@ def test_help_keeps_what_stands_in_brackets(command):
     assert "\\" not in printed
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_usage_has_no_brackets_nor_dots_twice(command):
+    app, words, _, _ = COMMANDS[command]
+    (usage,) = re.findall(r"Usage: .*", answer(app, *words, "--help").stdout)
+    assert not re.search(r"\[\[|\]\]|\.[]}]", usage)
+
+
 def test_help_breaks_lines_only_at_the_edge_and_between_paragraphs():
     printed = answer(analytic.cli.app, "design", "--help").stdout
     assert "beyond the limit, and which input matters most. The barrier is then the one of --barrier-mass" in printed

@@ -147,10 +147,17 @@ def test_a_bare_checkout_has_a_hint_too(monkeypatch):
     assert extras.missing("It", "Dask", "sweep") == "It needs Dask: pip install '.[sweep]' in the project's folder"
 
 
-def test_a_users_file_does_not_stand_in_for_a_package_of_ours(tmp_path):
-    (tmp_path / "analytic.py").write_text("raise SystemExit('the wrong one')")
+@pytest.mark.parametrize(
+    ("file", "command"),
+    [
+        ("analytic.py", ("warp_mpm", "--version")),
+        ("warp_mpm.py", ("analytic", "predict", ROOT / "scenarios" / "set_iib.json")),
+        ("analytic.py", ("fmu", "--version")),
+    ],
+)
+def test_a_users_file_does_not_stand_in_for_a_package_of_ours(tmp_path, file, command):
+    (tmp_path / file).write_text("raise SystemExit('the wrong one')")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "warp_mpm", "--version"]
-    answer = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    words = [sys.executable, "-m", *map(str, command)]
+    answer = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.startswith(PROJECT)

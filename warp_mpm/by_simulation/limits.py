@@ -12,15 +12,16 @@ from typing import Any
 
 from warp_mpm.design_checks import CHECKS, Check
 from warp_mpm.quantities import Quantity
-from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.figures import NUMBERS as FIGURES
 from warp_mpm.scenario import Design, Scenario
 
 SYNONYMS = {"overtopped": "overtopped_share", "peak": "peak_force_filtered", "run_up": "run_up_max"}
 """Shorter words for figures."""
 
 FIGURES_OF_LIMITS: Mapping[str, Quantity] = {
-    **{name: figure for name, figure in FIGURES.items() if figure.number and name != "wall_time"},
-    **CHECKS,
+    name: quantity
+    for name, quantity in {**FIGURES, **CHECKS}.items()
+    if name not in ("barrier_at_rest", "barriers", "force_still_rises", "wall_time")
 }
 """What a limit may be on: the numbers of `summary.json` and of its verdict, whose words come first."""
 

@@ -24,7 +24,7 @@ def accuracy(
     scenarios: Annotated[
         list[Path],
         typer.Argument(
-            metavar="SCENARIO...",
+            metavar="SCENARIO",
             help="Scenario files. One: the whole study; several: a ladder of spacings of each, beside the closed form.",
             show_default=False,
         ),

@@ -12,7 +12,7 @@ from analytic.command_line import BAD_INPUT, complain, refusals, tell
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", show_default=False)],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Scenario files.", show_default=False)],
     plot: Annotated[
         Path | None,
         typer.Option(

@@ -17,7 +17,7 @@ def _option(words: str) -> Any:
 
 
 def init(
-    file: Annotated[Path, typer.Argument(metavar="[FILE]", help="Scenario file to make.")] = Path("site.json"),
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Scenario file to make.")] = Path("site.json"),
     depth: Annotated[str | None, _option("Depth of the flow [m].")] = None,
     length: Annotated[str | None, _option("Length of the flow [m], of the box of its volume and depth.")] = None,
     volume: Annotated[str | None, _option("Volume of the flow [m3/m], in place of its length.")] = None,

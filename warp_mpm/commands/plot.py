@@ -37,7 +37,7 @@ def plot(
             show_default=False,
         ),
     ],
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders.", show_default=False)],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR", help="Run folders.", show_default=False)],
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A png, pdf or svg file.", show_default="KIND.png here")
     ] = None,

@@ -15,7 +15,7 @@ def quantities(
     scenario: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[SCENARIO]", help="Scenario file: only the columns that its time series has.", show_default=False
+            metavar="SCENARIO", help="Scenario file: only the columns that its time series has.", show_default=False
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,

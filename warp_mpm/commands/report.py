@@ -12,7 +12,7 @@ from warp_mpm.commands.options import DEFAULT_TIMES, times_of, times_within
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders.", show_default=False)],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN_DIR", help="Run folders.", show_default=False)],
     out: Annotated[
         Path | None,
         typer.Option(

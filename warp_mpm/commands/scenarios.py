@@ -14,7 +14,7 @@ from analytic.command_line import refusals
 def scenarios(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Scenes: case_1, hard/speed_50, ...", show_default="all"),
+        typer.Argument(metavar="NAME", help="Scenes: case_1, hard/speed_50, ...", show_default="all"),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Copy them into this folder.", show_default=False)

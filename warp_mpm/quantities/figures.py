@@ -271,5 +271,8 @@ _ROWS = (
 FIGURES: Mapping[str, Figure] = {row.name: row for row in _ROWS}
 """Key figures by name."""
 
+NUMBERS: Mapping[str, Figure] = {name: figure for name, figure in FIGURES.items() if figure.number}
+"""Those of them that a limit may be on."""
+
 NEEDED: Mapping[str, tuple[str, ...]] = {figure.name: figure.needs for figure in _ROWS if figure.needs}
 """Columns of the time series that a figure is taken from."""
