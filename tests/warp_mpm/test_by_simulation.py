@@ -41,6 +41,8 @@ CREST, HEIGHT = "barrier.shape.crest_width_m", "barrier.shape.height_m"
         ("sliding_factor >= 1.3", "sliding_factor", 1.3, True),
         ("overtopped_volume < 3 m³/m", "overtopped_volume", 3.0, False),
         ("run_up_max <= 4", "run_up_max", 4.0, False),
+        ("displacement <= 50 cm", "displacement", 0.5, False),
+        ("base_pressure <= 0.2MPa", "base_pressure", 2e5, False),
     ],
 )
 def test_limits_as_they_are_typed(text, name, bound, least):
@@ -55,9 +57,18 @@ def test_limits_as_they_are_typed(text, name, bound, least):
         ("displacment <= 1", "--limit displacment: there is no such figure; near it are displacement"),
         ("overtoped <= 1", "near it are overtopped"),
         ("displacement 0.5", "it must read FIGURE <= NUMBER or FIGURE >= NUMBER"),
-        ("displacement <= 3 kg", "kg is no unit of it; it must be one of m."),
+        ("displacement <= 3 kg", "kg is no unit of it; it must be one of m, cm, mm."),
         ("sliding_factor <= 1.5", "it must be sliding_factor >= NUMBER"),
         ("barrier_at_rest <= 1", "there is no such figure"),
+        ("barriers <= 1", "there is no such figure"),
+        (
+            "overtopped <= 20",
+            "overtopped <= 20 is not allowed; it must be a finite number at least 0 and at most 1; 20 %",
+        ),
+        ("overtopped <= 2000 %", "overtopped <= 2000 % is not allowed; it must be a finite number at least 0 and at"),
+        ("displacement <= -1 cm", "displacement <= -1 cm is not allowed; it must be a finite number at least 0"),
+        ("barrier_displacement_final <= -1", "is not allowed; it must be a finite number at least 0"),
+        ("sliding_factor >= 150", "it must be a finite number at least 0.1 and at most 10; 150 % was probably meant."),
     ],
 )
 def test_what_is_no_limit(text, sentence):

@@ -14,6 +14,7 @@ from warp_mpm.design_checks import CHECKS, Check
 from warp_mpm.quantities import Quantity
 from warp_mpm.quantities.figures import NUMBERS as FIGURES
 from warp_mpm.scenario import Design, Scenario
+from warp_mpm.scenario_errors import ScenarioError
 
 SYNONYMS = {"overtopped": "overtopped_share", "peak": "peak_force_filtered", "run_up": "run_up_max"}
 """Shorter words for figures."""
@@ -36,6 +37,9 @@ DESIGN_FIELDS = {
     "freeboard": "freeboard_m",
 }
 """Fields of a scenario's `design` group by the figures that they limit."""
+
+MORE_UNITS = {"m": {"cm": 1e-2, "mm": 1e-3}, "Pa": {"MPa": 1e6}, "N/m": {"MN/m": 1e6}}
+"""Units that a limit may have beside that of the files and that which people are shown, with the factors to SI."""
 
 FORM = re.compile(r"\s*(\w+)\s*(<=|>=|<|>|≤|≥)\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S.*)?\s*")
 
@@ -132,12 +136,31 @@ def _limit(text: str) -> Limit:
     value = float(number)
     if not math.isfinite(value):
         raise ValueError(f"--limit {word}: {number} must be a finite number.")
-    return Limit(name, value * _factor(quantity, unit, word), least)
+    bound = value * _factor(quantity, unit, word)
+    refused = _beyond_range(name, bound)
+    if refused is not None:
+        percent = quantity.unit == "-" and unit is None and bound > 0.0 and _beyond_range(name, 0.01 * bound) is None
+        meant = f"; {number} % was probably meant" if percent else ""
+        typed = f"{word} {sign} {number}" if unit is None else f"{word} {sign} {number} {unit.strip()}"
+        raise ValueError(f"--limit {typed} is not allowed; {refused}{meant}.")
+    return Limit(name, bound, least)
+
+
+def _beyond_range(name: str, bound: float) -> str | None:
+    """What a limit must be that the `design` group has a field for and that this is not [SI]; None where it is."""
+    field = DESIGN_FIELDS.get("displacement" if name in DISPLACEMENTS else name)
+    if field is None:
+        return None
+    try:
+        Design.model_validate({field: bound})
+    except ScenarioError as error:
+        return error.problems[0].partition("not allowed; ")[2].rstrip(".")
+    return None
 
 
 def _factor(quantity: Quantity, unit: str | None, word: str) -> float:
     """From the unit that was typed to SI."""
-    units = {quantity.unit: 1.0, quantity.shown_unit: 1.0 / quantity.factor}
+    units = {quantity.unit: 1.0, quantity.shown_unit: 1.0 / quantity.factor} | MORE_UNITS.get(quantity.unit, {})
     if quantity.unit == "-":
         units = {"": 1.0, "-": 1.0, "%": 0.01}
     if unit is None:
