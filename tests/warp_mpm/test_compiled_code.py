@@ -40,7 +40,8 @@ with patch.object(module, "_get_live_kernels", lambda: of_update):
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="looked at on x86 alone")
 @pytest.mark.parametrize(
-    "name", ["case_1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("case_1_mud", "case_1_mu_i"))]
+    "name",
+    ["case_1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("case_1_mud", "case_1_mu_i", "case_1_loose"))],
 )
 def test_the_update_of_the_points_is_vectorised(tmp_path, name):
     """The compiler says so itself; one call or one branch too many and a step costs half as much again. It is given
@@ -79,6 +80,7 @@ def test_the_update_of_the_points_is_vectorised(tmp_path, name):
         pytest.param("case_1_dry", "float32", marks=pytest.mark.slow),
         pytest.param("case_1_mud", "float64", marks=pytest.mark.slow),  # a quarter of a minute each
         pytest.param("case_1_mu_i", "float64", marks=pytest.mark.slow),
+        pytest.param("case_1_loose", "float64", marks=pytest.mark.slow),
     ],
 )
 def test_the_same_kernels_compile_for_a_gpu(load_scene, tmp_path, name, precision):

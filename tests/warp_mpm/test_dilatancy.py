@@ -244,3 +244,96 @@ def test_laws_that_know_no_density_refuse_it(load_scene):
     ):
         Scenario.model_validate(content)
     assert scene(load_scene).replaced(with_law(scene(load_scene), "elastic")).flow.material.dilatancy is None
+
+
+# -- in a flow -------------------------------------------------------------------------------------------------------
+
+
+def body_on_level_ground(*, scale=1.0, side=1.0, fraction=0.50, coefficient=1.0, speed=4.0, own=True, end=0.4):
+    """A body of 6 m by 2 m that slides on a rough level bed, toward +x, or toward -x with a side of -1. By Froude's law
+    lengths and stresses as `scale`, times and speeds as its root."""
+    root = math.sqrt(scale)
+    length, height = 6.0 * scale, 2.0 * scale
+    left = -0.5 * length
+    material = {
+        "grain_density_kg_per_m3": 2600.0,
+        "porosity": 1.0 - fraction,
+        "liquid_density_kg_per_m3": 1000.0,
+        "liquid_bulk_modulus_Pa": 3e7 * scale,
+        "liquid_viscosity_Pa_s": 0.01 * scale * root,
+        "young_modulus_Pa": 2e6 * scale,
+        "poisson_ratio": 0.25,
+        "friction_angle_deg": 30.0,
+        "hydraulic_conductivity_m_per_s": 1e-3 * root,
+    }
+    if own:
+        material["dilatancy"] = {
+            "critical_solid_fraction": 0.56,
+            "coefficient": coefficient,
+            "grain_diameter_m": 1e-3 * scale,
+        }
+    vertices = [[left, 0.0], [left + length, 0.0], [left + length, height], [left, height]]
+    return Scenario.model_validate(
+        {
+            "title": "body on level ground",
+            "flow": {
+                "formulation": "two_phase",
+                "shape": {"kind": "polygon", "vertices_m": vertices},
+                "velocity_m_per_s": [side * speed * root, 0.0],
+                "material": material,
+            },
+            "barrier": None,
+            "ground": {"friction": 0.5},
+            "domain": {"left_m": -8.0 * scale, "right_m": 8.0 * scale, "top_m": 4.0 * scale},
+            "numerics": {"spacing_m": 0.5 * scale},
+            "output": {"end_time_s": end * root},
+        }
+    )
+
+
+def run_of(scenario):
+    simulation = Simulation(scenario)
+    simulation.advance(scenario.output.end_time_s)
+    return simulation.points()
+
+
+@pytest.mark.slow
+class TestFlows:
+    def test_a_loose_body_goes_on_where_a_dense_one_stops(self):
+        reach = [
+            run_of(body_on_level_ground(fraction=fraction, end=1.0))["position"][:, 0].mean()
+            for fraction in (0.50, 0.56, 0.62)
+        ]
+        assert reach[0] - reach[1] > 0.1 * reach[1] < reach[1] - reach[2]
+
+    @pytest.mark.parametrize("fraction", [0.50, 0.62])
+    def test_its_mirror_image_does_the_same(self, fraction):
+        there, back = (run_of(body_on_level_ground(fraction=fraction, side=side)) for side in (1.0, -1.0))
+        # As the points of the one start where those of the other do, mirrored, sums over all of them are alike.
+        assert there["position"][:, 0].mean() == pytest.approx(-back["position"][:, 0].mean(), rel=1e-6)
+        assert there["position"][:, 1].mean() == pytest.approx(back["position"][:, 1].mean(), rel=1e-6)
+        assert there["pore_pressure"].mean() == pytest.approx(back["pore_pressure"].mean(), rel=1e-6)
+        assert there["porosity"].mean() == pytest.approx(back["porosity"].mean(), rel=1e-9)
+
+    @pytest.mark.parametrize("fraction", [0.50, 0.62])
+    def test_it_obeys_froudes_law(self, fraction):
+        small, large = (run_of(body_on_level_ground(fraction=fraction, scale=scale)) for scale in (1.0, 4.0))
+        np.testing.assert_allclose(large["position"], 4.0 * small["position"], atol=1e-7)
+        np.testing.assert_allclose(large["porosity"], small["porosity"], atol=1e-9)
+        np.testing.assert_allclose(
+            large["pore_pressure"], 4.0 * small["pore_pressure"], atol=1e-6 * np.abs(large["pore_pressure"]).max()
+        )
+
+    def test_without_a_coefficient_it_is_as_without_it(self):
+        plain, none = (run_of(body_on_level_ground(own=own, coefficient=0.0)) for own in (False, True))
+        np.testing.assert_allclose(none["position"], plain["position"], atol=1e-9)
+        np.testing.assert_allclose(none["effective_stress"], plain["effective_stress"], atol=1e-3)
+
+    @pytest.mark.parametrize("fraction", [0.50, 0.62])
+    def test_a_layer_at_rest_stays_at_rest(self, fraction):
+        scenario = body_on_level_ground(fraction=fraction, speed=0.0).replaced(
+            {"domain": {"left_edge": "wall", "right_edge": "wall", "left_m": -3.0, "right_m": 3.0, "top_m": 4.0}}
+        )
+        points = run_of(scenario)
+        assert np.abs(points["solid_velocity"]).max() < 5e-3
+        np.testing.assert_allclose(1.0 - points["porosity"], fraction, atol=1e-3)

@@ -88,7 +88,8 @@ def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
     assert all(arrays[name] == 4 * number for name in others)
     nodes = simulation.grid.columns * simulation.grid.rows
     doubles = sum(size for name, size in arrays.items() if name.startswith("grid.") and size >= 8 * nodes)
-    assert doubles == 8 * nodes * NODE_NUMBERS[flow.formulation]
+    # The drag of each node, where it follows the porosity.
+    assert doubles == 8 * nodes * (NODE_NUMBERS[flow.formulation] + simulation.effects.porosity_update)
     # Nothing is allocated that is not listed.
     assert {array.capacity for array in noted["allocated"]} <= set(arrays.values())
     if flow.formulation == "dry":

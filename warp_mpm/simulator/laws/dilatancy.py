@@ -11,8 +11,8 @@ from warp_mpm.schema import Model
 from .law import Law
 from .radial import TINY
 
-SWEEPS = 8
-"""Newton's steps to the pressure at the end of a step, each kept between bounds that close in: what is left is 1e-9 of
+ROUNDS, SWEEPS = 2, 3
+"""Newton's steps to the pressure at the end of a step, each kept between bounds that close in: what is left is 1e-6 of
 the pressure, or of a pascal."""
 
 STEEPEST = 1.0
@@ -103,7 +103,8 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
         slope = -parameters.dilatancy_coefficient * parameters.critical_solid_fraction
         slope *= F(0.5) * share * (F(1.0) - share) / (root * root)
         kept = larger(smaller(free, most), least)
-        return kept, wp.where(kept == free and pressure > F(0.0), slope, F(0.0))
+        falls = wp.where(kept == free, slope, F(0.0))
+        return kept, wp.where(pressure > F(0.0), falls, F(0.0))
 
     @wp.func
     def inclined(tangent_psi: F, sine: F, cosine: F):
@@ -159,17 +160,21 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
         at = smaller(larger(pressure, low), high)
         psi, change = tangent(m, at, inertia, viscous, parameters)
         friction = inclined(psi, sine, cosine)
-        for _sweep in range(wp.static(SWEEPS)):
-            slip = larger(excess - friction * larger(at, F(0.0)), F(0.0))
-            gap = at - pressure - gain * psi * slip
-            high = wp.where(gap > F(0.0), at, high)
-            low = wp.where(gap > F(0.0), low, at)
-            rubbed = wp.where(slip > F(0.0), gain * psi * friction, F(0.0))
-            slope = F(1.0) + larger(rubbed, F(-0.5)) - gain * change * slip
-            at -= gap / slope
-            at = wp.where(at >= low and at <= high, at, F(0.5) * (low + high))
-            psi, change = tangent(m, at, inertia, viscous, parameters)
-            friction = inclined(psi, sine, cosine)
+        # Twice three, written out one after the other: a loop would keep the compiler from doing several points at a
+        # time.
+        for _round in range(wp.static(ROUNDS)):
+            for _sweep in range(wp.static(SWEEPS)):
+                slip = larger(excess - friction * larger(at, F(0.0)), F(0.0))
+                gap = at - pressure - gain * psi * slip
+                high = wp.where(gap > F(0.0), at, high)
+                low = wp.where(gap > F(0.0), low, at)
+                rubbed = wp.where(slip > F(0.0), gain * psi * friction, F(0.0))
+                slope = F(1.0) + larger(rubbed, F(-0.5)) - gain * change * slip
+                at -= gap / slope
+                outside = larger(low - at, at - high)
+                at = wp.where(outside > F(0.0), F(0.5) * (low + high), at)
+                psi, change = tangent(m, at, inertia, viscous, parameters)
+                friction = inclined(psi, sine, cosine)
         return at, friction
 
     return SimpleNamespace(dilated=dilated)
