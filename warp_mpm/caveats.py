@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from warp_mpm.extent import domain_caveats
+from warp_mpm.quantities.quantity import of_width
 from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
 from warp_mpm.simulator.laws import LAWS
 from warp_mpm.slips import slips
@@ -187,7 +188,7 @@ def run_caveats(record: Mapping[str, Any], summary: Mapping[str, Any]) -> list[s
         found.append("The program's source differed from its commit when this was run.")
     if record.get("points_left"):
         left = summary.get("left_volume") or 0.0
-        found.append(f"{record['points_left']:,} material points ({left:.3g} m³/m) left the domain.")
+        found.append(f"{record['points_left']:,} material points ({left:.3g} {of_width('m³')}) left the domain.")
     if record.get("barrier_unconverged"):
         found.append(f"The barrier's motion was not solved to its tolerance in {record['barrier_unconverged']} steps.")
     precision = record.get("effects", {}).get("precision", "float64")

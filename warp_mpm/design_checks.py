@@ -19,6 +19,7 @@ from analytic.force_record import RESIDUAL_SHARE, moving_mean
 from warp_mpm import geometry
 from warp_mpm.arrival_figures import came_beyond, departed_volume
 from warp_mpm.quantities import Quantity
+from warp_mpm.quantities.quantity import FORCE, VOLUME
 from warp_mpm.scenario import Design, Fixed, FurtherBarrier, OutlineShape, Scenario, Sliding, Trapezoid
 from warp_mpm.scenario.site import standing_outline
 
@@ -61,7 +62,7 @@ CHECKS: Mapping[str, Check] = {
             shown=("%", 100.0), formula="overtopped volume / volume of the flow",
         ),
         Check(
-            "overtopped_volume", "m3/m", "volume beyond the crest at the end", "overtopped volume",
+            "overtopped_volume", VOLUME, "volume beyond the crest at the end", "overtopped volume",
             formula="overtopped volume, with what left the domain downstream",
         ),
         Check("freeboard", "m", "height of the crest above the greatest run-up", "freeboard", formula="H - h_r",
@@ -74,7 +75,7 @@ TOLD: Mapping[str, Check] = {
     check.name: check
     for check in (
         Check(
-            "static_load", "N/m", f"horizontal force left over the last {RESIDUAL_SHARE:.0%} of the run",
+            "static_load", FORCE, f"horizontal force left over the last {RESIDUAL_SHARE:.0%} of the run",
             "static load that stays", formula="mean of F over the last tenth",
         ),
         Check(
@@ -82,7 +83,7 @@ TOLD: Mapping[str, Check] = {
             formula="mean of F h_F over that of F",
         ),
         Check(
-            "hydrostatic_load", "N/m", "hydrostatic thrust of a deposit of the height reached at the end",
+            "hydrostatic_load", FORCE, "hydrostatic thrust of a deposit of the height reached at the end",
             "  hydrostatic, of that height", formula="½ ρ g cos θ h_d²",
         ),
         Check(
@@ -109,15 +110,15 @@ TOLD: Mapping[str, Check] = {
 GUIDELINES: Mapping[str, Check] = {
     check.name: check
     for check in (
-        Check("hong_kong", "N/m", "thrust on a rigid barrier", "Hong Kong (GEO), α = 2.5",
+        Check("hong_kong", FORCE, "thrust on a rigid barrier", "Hong Kong (GEO), α = 2.5",
               formula="α ρ v² h [recalled: high]"),
-        Check("switzerland_fine", "N/m", "thrust of a fine or muddy flow", "Switzerland (SIA 261/1), a = 2",
+        Check("switzerland_fine", FORCE, "thrust of a fine or muddy flow", "Switzerland (SIA 261/1), a = 2",
               formula="a ρ v² h [recalled: medium]"),
-        Check("switzerland_granular", "N/m", "thrust of a granular flow", "Switzerland (SIA 261/1), a = 4",
+        Check("switzerland_granular", FORCE, "thrust of a granular flow", "Switzerland (SIA 261/1), a = 4",
               formula="a ρ v² h [recalled: medium]"),
-        Check("japan", "N/m", "thrust of a direct hit", "Japan (2016), K_h = 1",
+        Check("japan", FORCE, "thrust of a direct hit", "Japan (2016), K_h = 1",
               formula="K_h ρ h v² [recalled: high]"),
-        Check("china", "N/m", "thrust on a flat face", "China (DZ/T 0239), λ = 1.33",
+        Check("china", FORCE, "thrust on a flat face", "China (DZ/T 0239), λ = 1.33",
               formula="λ ρ v² sin β h [recalled: medium]"),
     )
 }  # fmt: skip

@@ -25,6 +25,7 @@ from .kernels import layout as at
 from .kernels.build import build_kernels
 from .kernels.cache import initialize_warp, load_kernels
 from .kernels.pore_pressure import LEAST_POROSITY
+from .quantities.quantity import of_width
 from .quantities.time_series import OWN
 from .scenario import Scenario
 from .simulator.bodies import Body, Driven, Sliding
@@ -633,7 +634,7 @@ class Simulation:
         if self._barrier is None or not isinstance(self.bodies[self._barrier].motion, Sliding):
             raise ValueError("set_external_force needs a barrier whose motion is of the kind 'sliding'")
         if not abs(force) <= LARGEST_FORCE:
-            raise ValueError(_out_of_range("force", force, LARGEST_FORCE, "N/m"))
+            raise ValueError(_out_of_range("force", force, LARGEST_FORCE, of_width("N")))
         self._fill(self._body_arrays["external_force"][self._barrier : self._barrier + 1], float(force))
 
     @_one_thread_at_a_time_on_a_gpu

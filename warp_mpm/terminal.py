@@ -20,6 +20,7 @@ from warp_mpm.caveats import impact_goes_on, run_caveats, scene_caveats
 from warp_mpm.description import described
 from warp_mpm.design_checks import verdict_rows
 from warp_mpm.quantities.figures import FIGURES
+from warp_mpm.quantities.quantity import of_width
 from warp_mpm.quantities.time_series import NAMED
 from warp_mpm.results import Results
 from warp_mpm.run import RunOutcome, RunProgress
@@ -143,7 +144,7 @@ def _barrier_row(row: Mapping[str, Any]) -> str:
     if row["displacement"]:
         parts.append(f"moved {row['displacement']:.2f} m")
     if row["held_volume"] is not None:
-        parts.append(f"holds {row['held_volume']:.1f} m³/m, passed by {row['passed_volume']:.1f}")
+        parts.append(f"holds {row['held_volume']:.1f} {of_width('m³')}, passed by {row['passed_volume']:.1f}")
     if row["landing_distance"] is not None:
         parts.append(f"landing {row['landing_distance']:.1f} m from its heel")
     return "; ".join(parts)

@@ -19,6 +19,7 @@ from warp_mpm.by_simulation.fields import Range, number_at, with_values
 from warp_mpm.by_simulation.lightest import Box, Point, Search, Tried
 from warp_mpm.by_simulation.limits import DESIGN_FIELDS, DISPLACEMENTS, Limit, excess
 from warp_mpm.by_simulation.runs import Run, coarse
+from warp_mpm.quantities.quantity import of_width
 from warp_mpm.scenario import Scenario, Sliding, Trapezoid
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.site import notes_still_true
@@ -73,7 +74,7 @@ def objective_of(scenario: Scenario, name: str) -> Objective:
                 "--minimize mass: a barrier that is fixed or driven has no mass; give design.density_kg_per_m3, or "
                 "--minimize area."
             )
-        return Objective("mass", "mass of the barrier", "kg/m", ("t/m", 1e-3), mass)
+        return Objective("mass", "mass of the barrier", of_width("kg"), (of_width("t"), 1e-3), mass)
     if number_at(scenario, name, option="--minimize") is None:
         raise ValueError(f"--minimize {name}: the scenario leaves it out.")
     return Objective(name, name, "", ("-", 1.0), lambda scene: float(number_at(scene, name) or 0.0))

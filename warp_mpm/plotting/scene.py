@@ -14,6 +14,7 @@ from warp_mpm import geometry
 from warp_mpm.extent import domain_extent
 from warp_mpm.plotting.site import draw_barriers, draw_flow, draw_ground, lowest, stream
 from warp_mpm.plotting.style import BLUE, EDGE, GREY, heading
+from warp_mpm.quantities.quantity import of_width
 from warp_mpm.scenario import Scenario, Trapezoid, Wall
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
 from warp_mpm.scenario.site import all_standing
@@ -205,8 +206,8 @@ def _inflow_measures(panel: Axes, scenario: Scenario, bottom: float, step: float
     )  # fmt: skip
     first, last = inflow.times[0], inflow.times[-1]
     words = (
-        f"arrives from t = {first:.3g} to {last:.3g} s:\n{inflow.volume:.3g} m³/m, h ≤ {inflow.greatest_depth:.3g} m, "
-        f"v ≤ {inflow.greatest_speed:.3g} m/s"
+        f"arrives from t = {first:.3g} to {last:.3g} s:\n{inflow.volume:.3g} {of_width('m³')}, "
+        f"h ≤ {inflow.greatest_depth:.3g} m, v ≤ {inflow.greatest_speed:.3g} m/s"
     )
     outline = stream(inflow)
     panel.text(outline[:, 0].min(), outline[:, 1].max() + 0.3 * step, words, fontsize=9, va="bottom")
