@@ -188,7 +188,9 @@ def heap(quick: bool) -> Outcome:
                 end_time=12.0,
                 ground=NO_SLIP,
                 soil=MIXTURE
-                | {"law": "herschel_bulkley", "yield_stress_Pa": yield_stress, "consistency_Pa_s": 200.0}
+                # The last of the way takes a time that grows with the viscosity: with 200 Pa s the heap still creeps
+                # at 12 s, 4 % short of where it stops.
+                | {"law": "herschel_bulkley", "yield_stress_Pa": yield_stress, "consistency_Pa_s": 100.0}
                 | {"young_modulus_Pa": 5e5},
                 spacing_m=spacing,
                 domain={"left_edge": "wall", "left_m": 0.0, "right_m": 2.0 * front, "top_m": 1.2},
