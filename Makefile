@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: run test test-browser coverage lint validate accuracy docs fmus clean
+.PHONY: run test suite test-browser coverage lint validate accuracy docs fmus clean
 
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -24,9 +24,13 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# Both at the same time: types are checked on one core.
+test: $(VENV)/.test
+	$(MAKE) --no-print-directory --jobs=2 lint suite
+
 # A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice. The
 # longest first, as tests/conftest.py has them, which by itself would be the files of the most tests.
-test: lint
+suite: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 # Functions that Warp compiles are left out: Python does not run them.

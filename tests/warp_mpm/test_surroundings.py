@@ -44,14 +44,16 @@ def run(folder, redirection="", pictures=False, **environment):
 # -- streams -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+@pytest.mark.parametrize("encoding", [pytest.param("cp1252", marks=pytest.mark.slow), "ascii"])
 def test_a_run_in_any_encoding(tmp_path, encoding):
     answer = run(tmp_path / "run", PYTHONIOENCODING=encoding)
     assert (answer.returncode, answer.stderr) == (0, b"")
     assert "F2x" in answer.stdout.decode(encoding)
 
 
-@pytest.mark.parametrize("redirection", ["2>&-", ">&- 2>&- <&-", ">/dev/full 2>/dev/full"])
+@pytest.mark.parametrize(
+    "redirection", [pytest.param("2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-", ">/dev/full 2>/dev/full"]
+)
 def test_a_run_whose_streams_take_nothing(tmp_path, redirection):
     run(tmp_path / "run", redirection, pictures="<&-" in redirection)
     assert json.loads((tmp_path / "run" / run_folder.SUMMARY).read_text())["status"] == "finished"
