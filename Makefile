@@ -12,7 +12,7 @@ ENVIRONMENT = { $(BIN)/python -c $(FITS) && $(BIN)/python -c 'import pip'; } 2>/
 	{ echo "$(PYTHON) is not there or older than Python 3.11; name a newer one: make PYTHON=python3.12" >&2; exit 2; }; \
 	$(PYTHON) -m venv --clear $(VENV); }
 
-.PHONY: run test test-browser coverage lint validate accuracy docs fmus clean
+.PHONY: run test suite test-browser coverage lint validate accuracy docs fmus clean
 
 $(VENV)/.run: pyproject.toml
 	@$(ENVIRONMENT)
@@ -32,9 +32,13 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# Both at the same time: types are checked on one core.
+test: $(VENV)/.test
+	$(MAKE) --no-print-directory --jobs=2 lint suite
+
 # A file to one process: two would compile the same kernels at the same time, and make the runs of a module twice. The
 # longest first, as tests/conftest.py has them, which by itself would be the files of the most tests.
-test: lint
+suite: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 # Functions that Warp compiles are left out: Python does not run them.

@@ -8,17 +8,22 @@ DRAW = run._draw
 
 LONGEST = (
     "test_known_answers.py",
-    "test_bodies.py",
     "test_debris_flow.py",
+    "test_bodies.py",
     "test_effects.py",
+    "test_cross_check.py",
+    "test_resume.py",
+    "test_pictures.py",
+    "test_compiled_code.py",
+    "test_accuracy.py",
+    "test_laws.py",
+    "test_surroundings.py",
     "test_rooms.py",
     "test_safeguards.py",
     "test_collection.py",
-    "test_cross_check.py",
-    "test_transfer.py",
-    "test_resume.py",
+    "test_slope.py",
     "test_batch.py",
-    "test_compiled_code.py",
+    "test_sweep.py",
 )
 """Files that take longest, in the order in which they begin, so that no process is left alone with one at the end."""
 

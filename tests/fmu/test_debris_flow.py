@@ -205,9 +205,10 @@ def test_refused_step_can_be_taken_back(open_unit: Open) -> None:
     ("values", "says"),
     [
         ({"scenario_file": "/nowhere/scene.json"}, "/nowhere/scene.json"),
-        ({"device": "cuda:77"}, "device = 'cuda:77'"),
+        # A worker for each: `test_wrong_scenario_names_the_field` and test_cross_check.py stand for these two.
+        pytest.param({"device": "cuda:77"}, "device = 'cuda:77'", marks=pytest.mark.slow),
+        pytest.param({"spacing": 1e-7}, "spacing_m", marks=pytest.mark.slow),
         ({"spacing": -1.0}, "spacing is -1 m"),
-        ({"spacing": 1e-7}, "spacing_m"),
         ({"reply_time_limit": 0.0}, "reply_time_limit is 0 s"),
         ({"barrier_motion": 3}, "1 (as_scenario), 2 (driven)"),
     ],
@@ -259,7 +260,11 @@ def test_hanging_worker_is_ended(open_unit: Open) -> None:
 
 
 @posix_only
-@pytest.mark.parametrize("ending", ["terminate", "free", "reset"])
+@pytest.mark.parametrize(
+    "ending",
+    # Others that terminate and reset count the workers, too.
+    ["free", pytest.param("terminate", marks=pytest.mark.slow), pytest.param("reset", marks=pytest.mark.slow)],
+)
 def test_no_process_is_left(ending: str, host_class: Any, archives: dict[str, Path], unzipped: dict[str, Path]) -> None:
     """Neither with a state that the importer forgot to free."""
     host = host_class(archives["DebrisFlow"], unzipped["DebrisFlow"]).initialize(**QUICK).run(0.1)
@@ -298,7 +303,7 @@ HOST = """
 
 
 @posix_only
-@pytest.mark.parametrize("busy", [False, True])
+@pytest.mark.parametrize("busy", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_worker_dies_with_its_host(busy: bool, archives: dict[str, Path], unzipped: dict[str, Path]) -> None:
     """The host is killed while the worker waits, and in the middle of a long step."""
     code = textwrap.dedent(HOST) + ("fmu.doStep(0.0, 100.0)\n" if busy else "time.sleep(100)\n")
@@ -415,7 +420,7 @@ def test_prints_do_not_get_between_the_answers(tmp_path: Path) -> None:
     ("poison", "says"),
     [
         ('self.simulation._point_arrays["velocity"].fill_(1e6)', "diverged at t ="),
-        ('self.simulation._point_arrays["velocity"].fill_(nan)', "diverged at t ="),
+        pytest.param('self.simulation._point_arrays["velocity"].fill_(nan)', "diverged at t =", marks=pytest.mark.slow),
         ('self.simulation.sample = lambda: {"impact_force_x": nan}', "gave nan for impact_force_x"),
     ],
 )
@@ -447,7 +452,9 @@ def test_failed_computation_is_reported(poison: str, says: str, tmp_path: Path) 
     assert says in slave["message"]
     assert math.isnan(slave["impact_force_x"])
     assert not slave.do_step(0.1, 0.1)
+    assert len(workers()) == 1
     slave.terminate()
+    assert workers() == []
 
 
 @pytest.mark.parametrize(
@@ -476,9 +483,13 @@ def test_instances_do_not_disturb_each_other(open_unit: Open) -> None:
 
 
 def test_overtopped_volume_is_the_same_whenever_asked_for(open_unit: Open) -> None:
-    """Within each step for an importer that has asked before, and afterwards for one that asks for the first time."""
-    always, late = open_unit("DebrisFlow").initialize(**QUICK), open_unit("DebrisFlow").initialize(**QUICK)
-    assert always["overtopped_volume"] == 0.0
-    always.run(1.0, 0.5)
-    late.run(1.0, 0.5)
-    assert always["overtopped_volume"] == late["overtopped_volume"] > 0.0
+    """Within each step for an importer that has asked before; `test_unit_gives_the_numbers_of_the_plain_simulation`
+    asks for the first time afterwards."""
+    host, simulation = open_unit("DebrisFlow").initialize(**QUICK), plain_simulation()
+    assert host["overtopped_volume"] == 0.0
+    host.run(1.0, 0.5)
+    for time_then in (1.0, 1.5):
+        simulation.advance(time_then)
+    beyond = simulation.points()["position"][:, 0] > 7.5 + simulation.barrier_displacement
+    assert host["overtopped_volume"] == pytest.approx(deposited(simulation, beyond), rel=1e-9)
+    assert host["overtopped_volume"] > 0.0

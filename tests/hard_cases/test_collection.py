@@ -13,7 +13,6 @@ WORST = (
     "bulk_modulus_2e9",
     "conductivity_1e-9",
     "courant_0.99",
-    "falling_jet",
     "friction_angle_0",
     "mixture_viscosity_1e6",
     "mu_i_constant_0",

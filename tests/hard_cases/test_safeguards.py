@@ -1,10 +1,12 @@
 """Each safeguard switched off, and the scene that then fails. One that nothing needs would be removed.
 
 Off is next to nothing of it, where that does: kernels are compiled for each set of effects, and an effect of next to
-nothing leaves the set as it is.
+nothing leaves the set as it is. Those that take longest are run with `slow`; test_collection.py holds the scenes with
+all safeguards on by default.
 """
 
 import numpy as np
+import pytest
 
 from warp_mpm.effect_rules import with_law
 from warp_mpm.hard_cases.collection import hard_cases
@@ -22,6 +24,7 @@ def scene(name, changes=None):
     return case.scenario.replaced(changes or {})
 
 
+@pytest.mark.slow
 def test_volumetric_smoothing():
     """Without it the stiffest liquid locks: pressures differ within a cell by nearly half of what they are."""
     with_it = measure(scene("bulk_modulus_2e9")).figures["pressure_noise"]
@@ -51,6 +54,7 @@ def landed(without_bound):
     return simulation.points()["pore_pressure"].mean(), gaps.mean()
 
 
+@pytest.mark.slow
 def test_bound_on_gaps():
     """Without it points that have flown remember more void than there is, and the deposit bears no pore pressure."""
     pressure, gaps = landed(without_bound=False)
@@ -89,6 +93,7 @@ def test_grains_keep_their_volume():
     assert without.figures["stress_ratio"] > 1e3
 
 
+@pytest.mark.slow
 def test_cavitation():
     """A liquid that bears any tension holds spray together by its noise."""
     held = scene("speed_50", {"flow.material.cavitation_pressure_Pa": 1e12})
@@ -134,6 +139,7 @@ def overshoot(bulk_viscosity):
     return points["pore_pressure"].max() / plateau - 1.0
 
 
+@pytest.mark.slow
 def test_bulk_viscosity():
     assert overshoot(0.2) < 0.10
     assert overshoot(NEXT_TO_NOTHING) > 0.15

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from analytic.scene import scene_of
 from warp_mpm.accuracy import check as checking
-from warp_mpm.accuracy import keys, shipped
+from warp_mpm.accuracy import keys, runner, shipped
 from warp_mpm.accuracy.budget import Budget
 from warp_mpm.accuracy.check import Check, Got, check, drawn, holds, table, truth_of
 from warp_mpm.accuracy.errors import errors, extrapolate, overall, references
@@ -40,6 +40,7 @@ from warp_mpm.accuracy.study import (
 )
 from warp_mpm.accuracy.tables import budget_table, csv_table, markdown
 from warp_mpm.accuracy.verdict import Study, evaluate, front, sentences
+from warp_mpm.engine import Ended, Processes
 from warp_mpm.scenario import Scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -559,6 +560,7 @@ class TestPictures:
             time, error = np.log(line.get_xdata()), np.log(line.get_ydata())
             assert -np.polyfit(time, error, 1)[0] == pytest.approx(study.slopes["peak_force"].cost, rel=0.05)
 
+    @pytest.mark.slow  # the full study's picture, for labels that touch
     def test_settings_and_spacings_are_told_apart(self, scene: Scenario) -> None:
         settings = plan(scene, quick=False)
         random = np.random.default_rng(3)
@@ -820,7 +822,18 @@ class TestRunner:
         assert second[settings[0].key]["figures"] == first[settings[0].key]["figures"]
 
     @pytest.mark.parametrize("damaged", ["{", '{"status": "finished"}'])
-    def test_damaged_result_is_run_again(self, scene: Scenario, tmp_path: Path, damaged: str) -> None:
+    def test_damaged_result_is_run_again(
+        self, scene: Scenario, tmp_path: Path, damaged: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        class Here(Processes):
+            """No process, whose start takes longer than the run."""
+
+            def run(self, tasks, *, on_start, **_):
+                for task in tasks:
+                    on_start(task)
+                    yield Ended(task, task.function(*task.arguments))
+
+        monkeypatch.setattr(runner, "Processes", Here)
         (setting,) = ladder(scene.replaced({"output.end_time_s": 0.02}), [1.0])
         (tmp_path / f"{setting.key}.json").write_text(damaged)
         assert run_settings([setting], tmp_path, jobs=1)[setting.key]["figures"]

@@ -161,7 +161,7 @@ def test_walls_stay_in_place_while_the_grid_rides(load_scene):
         "numerics.spacing_m": 0.5,
         "domain.left_edge": "wall", "domain.right_edge": "wall", "domain.left_m": -25.0, "domain.right_m": 20.0,
     }  # fmt: skip
-    simulation = Simulation(load_scene("case_1_dry", **changes))
+    simulation = Simulation(load_scene("case_1", **changes))
     simulation.advance(0.4)
     step = float(simulation._clock.numpy()[2])
     shift = simulation.barrier_displacement - 2.0 * step
@@ -205,7 +205,7 @@ def test_places_of_one_colour_share_no_node(height):
     """So that threads may do them at the same time; and those that stand alone share a node with none."""
     bodies = [Body("pillar", Outline(0.7 * CIRCLE + [0.0, 3.1])),
               Body("slope", Outline([[4.0, 2.0 + height], [-4.0, 5.0 + height]], closed=False))]  # fmt: skip
-    simulation = basin(bodies=bodies, domain={"left_m": -8.0, "right_m": 8.0, "top_m": 6.0}, barrier=None)
+    simulation = basin("undrained", bodies=bodies, domain={"left_m": -8.0, "right_m": 8.0, "top_m": 6.0}, barrier=None)
     passing = [False] * len(simulation.bodies)
     places = places_of(simulation.bodies, simulation.grid, passing)
     joined = sharing(places, simulation.bodies, simulation.grid, passing)

@@ -139,6 +139,7 @@ def test_navigation_leads_to_pages():
         assert (ROOT / "docs" / page).is_file(), page
 
 
+@pytest.mark.slow  # the page of the API has the same calls
 def test_notebook_runs(folder):
     """Its cells one after the other, as a notebook runs them; Jupyter itself is not needed for that."""
     cells = json.loads((ROOT / "docs/notebook.ipynb").read_text())["cells"]

@@ -19,6 +19,10 @@ from warp_mpm.time_step import step_limits
 SCENES = Path(__file__).parents[2] / "scenarios"
 SHIPPED = sorted(path.stem for path in SCENES.glob("*.json") if not path.stem.startswith("site_"))
 
+LIKE = ("case_1", "set_iib", "set_iib_fixed")
+"""Shipped scenes of these names alone, and the variants of case 1: the others have the effects of one of them, which
+`test_every_rule_names_an_effect_and_gives_a_reason` looks at in all."""
+
 TRANSPORT = ["clear", "forget", "scatter", "move"]
 CONTACT = ["press", "join"]
 
@@ -64,7 +68,13 @@ def watched(monkeypatch):
     return noted
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in LIKE or name.startswith("case_1_") else pytest.param(name, marks=pytest.mark.slow)
+        for name in SHIPPED
+    ],
+)
 def test_kernels_and_arrays_of_every_shipped_scene(load_scene, watched, name):
     noted = watched
     scenario = load_scene(name, **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.01})

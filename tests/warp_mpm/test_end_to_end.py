@@ -59,7 +59,7 @@ def test_barrier_obeys_newton_by_the_recorded_forces(run):
 
 def test_same_scene_same_numbers(run, tmp_path):
     folder, _ = run
-    assert command("run", folder / "scenario.json", "--out", tmp_path / "again", "--quiet").returncode == 0
+    assert command("run", folder / "scenario.json", "--out", tmp_path / "again", "--no-pictures").returncode == 0
     assert (tmp_path / "again/timeseries.csv").read_bytes() == (folder / "timeseries.csv").read_bytes()
 
 

@@ -197,7 +197,8 @@ def test_more_than_a_machine_holds_is_refused(load_scene, changes, sentence):
 @pytest.mark.usefixtures("runs_with_pictures")
 def test_names_in_a_scenario_lead_nowhere(tmp_path, coarse_case_1, flying_points):
     """No text of a scenario becomes a path."""
-    scenario = coarse_case_1.replaced({"title": "../../escaped", "source": "/etc/passwd", "notes": ["../x"]})
+    texts = {"title": "../../escaped", "source": "/etc/passwd", "notes": ["../x"]}
+    scenario = coarse_case_1.replaced(texts | {"output.end_time_s": 0.3})
     run_scenario(scenario, tmp_path / "run", make_simulation=flying_points)
     evaluate(tmp_path / "run")
     assert [item.name for item in tmp_path.iterdir()] == ["run"]

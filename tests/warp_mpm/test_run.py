@@ -142,7 +142,6 @@ def test_a_scene_without_barrier_has_a_picture_of_the_flow_alone(tmp_path, load_
     assert (tmp_path / run_folder.PRESSURE_PLOT).exists()
 
 
-@pytest.mark.usefixtures("runs_with_pictures")
 def test_evaluation_can_be_repeated(tmp_path, coarse_case_1, flying_points):
     outcome = run_scenario(coarse_case_1, tmp_path, make_simulation=flying_points)
     (tmp_path / run_folder.SUMMARY).unlink()

@@ -44,14 +44,16 @@ def run(folder, redirection="", pictures=False, **environment):
 # -- streams -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+@pytest.mark.parametrize("encoding", [pytest.param("cp1252", marks=pytest.mark.slow), "ascii"])
 def test_a_run_in_any_encoding(tmp_path, encoding):
     answer = run(tmp_path / "run", PYTHONIOENCODING=encoding)
     assert (answer.returncode, answer.stderr) == (0, b"")
     assert "F2x" in answer.stdout.decode(encoding)
 
 
-@pytest.mark.parametrize("redirection", ["2>&-", ">&- 2>&- <&-", ">/dev/full 2>/dev/full"])
+@pytest.mark.parametrize(
+    "redirection", [pytest.param("2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-", ">/dev/full 2>/dev/full"]
+)
 def test_a_run_whose_streams_take_nothing(tmp_path, redirection):
     run(tmp_path / "run", redirection, pictures="<&-" in redirection)
     assert json.loads((tmp_path / "run" / run_folder.SUMMARY).read_text())["status"] == "finished"
@@ -136,6 +138,38 @@ def test_broken_compiled_kernels_are_built_anew(kernel_cache, tmp_path, caplog, 
     kernel_cache()
     cache.load_kernels(MODULE, "cpu")
     assert len(caplog.messages) == 1
+
+
+def test_of_several_processes_one_compiles(kernel_cache, tmp_path, monkeypatch):
+    """What is compiled is locked meanwhile; whoever waits for the lock finds it compiled then."""
+    fcntl = pytest.importorskip("fcntl")
+    build, flock, built, waited = warp_build.build_cpu, fcntl.flock, [], []
+
+    def build_cpu(*arguments, **options):
+        (lock,) = tmp_path.glob("*.lock")
+        with lock.open() as file, pytest.raises(BlockingIOError):
+            flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        built.append(lock)
+        return build(*arguments, **options)
+
+    monkeypatch.setattr(warp_build, "build_cpu", build_cpu)
+    cache.load_kernels(MODULE, "cpu")
+    assert works()
+    assert len(built) == 1
+    assert not built[0].exists()
+    kernel_cache()
+    (folder,) = tmp_path.iterdir()
+    aside = folder.rename(tmp_path / "by another process")
+
+    def other_is_done(file, how):
+        waited.append(how)
+        aside.rename(folder)
+
+    monkeypatch.setattr(fcntl, "flock", other_is_done)
+    cache.load_kernels(MODULE, "cpu")
+    assert works()
+    assert waited == [fcntl.LOCK_EX]
+    assert len(built) == 1
 
 
 def test_a_build_that_failed_is_tried_again(kernel_cache, monkeypatch, caplog):

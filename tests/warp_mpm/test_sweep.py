@@ -157,11 +157,11 @@ def by_value(flying_points):
         cloudpickle.unregister_pickle_by_value(module)
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """A scheduler and two workers, processes of their own on the loopback."""
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A scheduler and two workers, processes of their own on the loopback. The test that kills a worker is the last."""
     pytest.importorskip("distributed")
-    address = tmp_path / "scheduler.json"
+    address = tmp_path_factory.mktemp("cluster") / "scheduler.json"
     options = ["--no-dashboard", "--scheduler-file", str(address)]
     start = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": SET_IIB.parents[1]}
@@ -181,6 +181,19 @@ def cluster(tmp_path):
     for process in processes:
         process.kill()
         process.wait()
+
+
+def test_only_what_is_missing_is_run_again(tmp_path, load, cluster, by_value):
+    address, _ = cluster
+    plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 12]}}))
+    base, out = Scenario.load(SET_IIB), tmp_path / "out"
+    run_sweep(plan, base, out, scheduler=address, make_simulation=by_value)
+    record = out / "cases/00001/run.json"
+    record.write_text(record.read_text().replace('"finished"', '"running"'))  # as after a power cut
+    again = []
+    rows = run_sweep(plan, base, out, scheduler=address, on_case=again.append, make_simulation=by_value)
+    assert [row["case"] for row in again] == [1]
+    assert [row["status"] for row in rows] == ["finished"] * 3
 
 
 def test_a_killed_worker_and_a_failing_case_lose_nothing(tmp_path, load, cluster, by_value):
@@ -233,19 +246,6 @@ def test_a_case_asked_for_again_is_not_run_again(tmp_path, flying_points):
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     assert run_case(scenario, str(folder), make_simulation=flying_points) is None
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
-
-
-def test_only_what_is_missing_is_run_again(tmp_path, load, cluster, by_value):
-    address, _ = cluster
-    plan = load(sweep_of("grid", {SPEED: {"values": [10, 11, 12]}}))
-    base, out = Scenario.load(SET_IIB), tmp_path / "out"
-    run_sweep(plan, base, out, scheduler=address, make_simulation=by_value)
-    record = out / "cases/00001/run.json"
-    record.write_text(record.read_text().replace('"finished"', '"running"'))  # as after a power cut
-    again = []
-    rows = run_sweep(plan, base, out, scheduler=address, on_case=again.append, make_simulation=by_value)
-    assert [row["case"] for row in again] == [1]
-    assert [row["status"] for row in rows] == ["finished"] * 3
 
 
 def test_command_refuses_in_one_sentence(tmp_path):

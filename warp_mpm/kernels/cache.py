@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import shutil
 import tempfile
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,11 @@ from typing import Any
 import warp as wp
 
 from analytic.whole_file import UnwrittenError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 _log = logging.getLogger("warp_mpm")
 
@@ -76,13 +83,35 @@ def _load(module_name: str, device: Any, *, again: bool = False) -> None:
     module = wp.get_module(module_name)
     if again:
         module.mark_modified()  # forgets the failure before, which Warp would repeat
-    wp.load_module(module, device=device)
+    with _one_at_a_time(module, device):
+        wp.load_module(module, device=device)
     # An object with a hole in it, which a crash of the machine may leave, can load and lack kernels.
     for execution in module.execs.values():
         for kernel in module.kernels.values():
             if execution.get_kernel_hooks(kernel).forward is None:
                 module.execs.clear()
                 raise RuntimeError(f"{kernel.key} is missing in the compiled kernels of {module_name}")
+
+
+@contextlib.contextmanager
+def _one_at_a_time(module: Any, device: Any) -> Iterator[None]:
+    """Of several processes that need the same kernels one compiles them; the others wait for it, and take what it made.
+
+    Where there are no locks each compiles its own.
+    """
+    folder = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(
+        1 if wp.get_device(device).is_cpu else None
+    )
+    if fcntl is None or folder.exists():
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        path = folder.with_name(f"{folder.name}.lock")
+        with contextlib.suppress(OSError):  # if nothing can be written there, loading will tell
+            file = stack.enter_context(path.open("w"))
+            stack.callback(path.unlink, missing_ok=True)
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def _folders(module_name: str) -> list[Path]:
