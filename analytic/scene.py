@@ -186,7 +186,8 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     remarks += slips(scenario)
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
-    if scenario.ground is not None and scenario.ground.friction != 0:
+    remarks += _of_material(scenario)
+    if scenario.ground is not None and (scenario.ground.friction != 0 or any(scenario.ground.drags)):
         remarks.append("The friction between flow and ground is left out.")
     if scenario.ground is not None and scenario.ground.profile_m is not None:
         remarks.append("The ground's profile is left out: the closed form knows one slope, gravity.tilt_deg.")
@@ -209,3 +210,19 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         distance=-float(flow.polygon[:, 0].max()),
         remarks=tuple(remarks),
     )
+
+
+def _of_material(scenario: Any) -> list[str]:
+    """What the closed form does not know of the flow's material, where it is another one than the paper's."""
+    flow, found = scenario.flow, []
+    if flow.material.law != "mohr_coulomb":
+        found.append(
+            f"The flow's law, {flow.material.law}, is left out: the closed form knows mass, length, depth and speed."
+        )
+    if flow.material.dilatancy is not None:
+        found.append(
+            "The flow's dilatancy is left out: whether it liquefies or locks as it arrives is not in the closed form."
+        )
+    if flow.initial_pore_pressure_ratio is not None:
+        found.append("The flow's pore pressure at the start is left out.")
+    return found
