@@ -200,11 +200,10 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
     if not scenario.gravity.acceleration_m_per_s2 > 0:
         raise SceneError(f"{name}: gravity.acceleration_m_per_s2 is 0, the closed form needs weight on the base.")
     remarks += slips(scenario)
-    if flow.material.law != FITTED_LAW:
-        remarks.append(f"The material's law, {flow.material.law}, is left out: the closed form knows no strength.")
     if velocity_y != 0:
         remarks.append(f"The flow's vertical velocity of {velocity_y:g} m/s is left out.")
-    if scenario.ground is not None and scenario.ground.friction != 0:
+    remarks += _of_material(scenario)
+    if scenario.ground is not None and (scenario.ground.friction != 0 or any(scenario.ground.drags)):
         remarks.append("The friction between flow and ground is left out.")
     if scenario.ground is not None and scenario.ground.profile_m is not None:
         remarks.append("The ground's profile is left out: the closed form knows one slope, gravity.tilt_deg.")
@@ -236,3 +235,17 @@ def _first_arrival(inflow: Any) -> float:
     """Time [s] from which something arrives: depths are linear between the times of the table."""
     first = next(place for place, depth in enumerate(inflow.depths_m) if depth > 0)
     return float(inflow.times_s[max(first - 1, 0)])
+
+
+def _of_material(scenario: Any) -> list[str]:
+    """What the closed form does not know of the flow's material, where it is another one than the paper's."""
+    flow, found = scenario.flow, []
+    if flow.material.law != FITTED_LAW:
+        found.append(f"The material's law, {flow.material.law}, is left out: the closed form knows no strength.")
+    if flow.material.dilatancy is not None:
+        found.append(
+            "The flow's dilatancy is left out: whether it liquefies or locks as it arrives is not in the closed form."
+        )
+    if flow.initial_pore_pressure_ratio is not None:
+        found.append("The flow's pore pressure at the start is left out.")
+    return found

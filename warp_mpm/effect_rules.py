@@ -59,7 +59,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             drag,
             f"two phases, numerics.drag = {drag}" if drag != "none" else "there are no two phases",
             {"numerics.drag": {"semi_implicit": "explicit", "explicit": "semi_implicit"}[drag]}
-            if two_phase and not inertial
+            if isinstance(flow, TwoPhaseFlow) and flow.material.may_be_explicit
             else {},
         ),
         Rule(
@@ -81,7 +81,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             conductivity,
             f"flow.material.conductivity_law = {conductivity}" if two_phase else "there are no two phases",
             {"flow.material.conductivity_law": "kozeny_carman" if conductivity == "constant" else "constant"}
-            if porosity
+            if porosity and drag == "semi_implicit"
             else {},
         ),
         Rule(

@@ -107,6 +107,22 @@ def test_what_the_closed_form_leaves_out_is_said() -> None:
     assert scene_of(scenario()).notes == ()
 
 
+def test_what_it_does_not_know_of_the_law_is_said() -> None:
+    folder = Path(__file__).parents[2] / "scenarios"
+    assert not [one for one in read_scene(folder / "case_1.json").remarks if "law" in one or "dilatancy" in one]
+    assert any("law, herschel_bulkley, is left out" in one for one in read_scene(folder / "case_1_mud.json").remarks)
+    assert any("dilatancy is left out" in one for one in read_scene(folder / "case_1_loose.json").remarks)
+    case_1 = Scenario.load(folder / "case_1.json")
+    liquefied = case_1.replaced({"flow.initial_pore_pressure_ratio": 1.0})
+    assert any("pore pressure at the start is left out" in one for one in scene_of(liquefied).remarks)
+    voellmy = case_1.replaced({"ground.turbulence_m_per_s2": 200.0})
+    assert any("friction between flow and ground is left out" in one for one in scene_of(voellmy).remarks)
+    for command, runner in (("predict", closed_form), ("parameters", fmu)):
+        told = CliRunner().invoke(runner, [command, str(folder / "case_1_loose.json")])
+        assert told.exit_code == 0, told.output
+        assert "dilatancy is left out" in " ".join(told.output.split()), command
+
+
 def test_the_base_soil_s_friction_angle_counts_by_four_fifths() -> None:
     motion = {"kind": "sliding", "mass_kg_per_m": 5e4, "base_soil_friction_angle_deg": 30.0}
     found = scene_of(scenario(**{"barrier/motion": motion}))

@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_mpm.effect_rules import effect_rules
+from warp_mpm.effects import Effects
+from warp_mpm.kernels.layout import layout
+from warp_mpm.kernels.pore_pressure import make_pore_pressure
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
 from warp_mpm.summary import energy_error
@@ -198,3 +202,90 @@ def test_inertial_drag_is_implicit_alone(load_scene):
     for kept in ({"numerics.drag": "explicit"}, {"flow.material.inertial_drag_coefficient": 0.4}):
         for rule in effect_rules(load_scene("case_1", **kept)):
             load_scene("case_1", **kept).replaced(rule.switched)
+
+
+@pytest.mark.parametrize("law", ["kozeny_carman", "exponential"])
+def test_conductivity_follows_the_porosity(law):
+    """The function that the nodes' drag rests on, against the formulas."""
+    effects = Effects("two_phase", drag="semi_implicit", porosity_update=True, conductivity=law)
+    types = layout(effects)
+    resistance = make_pore_pressure(types).resistance
+    parameters = types.Parameters()
+    parameters.porosity = 0.45
+    if law == "exponential":
+        parameters.conductivity_scale = 0.04
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def over(n: wp.array(dtype=wp.float64), parameters: types.Parameters):
+        p = wp.tid()
+        n[p] = resistance(n[p], parameters)
+
+    given = np.linspace(0.05, 0.95, 19)
+    found = wp.array(given, dtype=wp.float64, device="cpu")
+    wp.launch(over, len(given), [found, parameters], device="cpu")
+    permeability = {
+        "kozeny_carman": given**3 / (1.0 - given) ** 2 / (0.45**3 / 0.55**2),
+        "exponential": np.exp((given - 0.45) / 0.04),
+    }[law]
+    np.testing.assert_allclose(found.numpy(), 1.0 / permeability, rtol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "inertial"), [("kozeny_carman", 0.0), ("exponential", 0.0), ("exponential", 1e-3)])
+def test_drag_decays_at_the_rate_of_the_porosity_that_there_is(load_scene, law, inertial):
+    """As a flying block whose skeleton has been pressed together: n²/k there in place of that at the start; with
+    Forchheimer's part besides, n³/√κ, as in the test of that above. First order in the step."""
+    ratio, duration = 0.9, 0.006
+    n = 1.0 - 0.5 / ratio
+    resisting = {
+        "kozeny_carman": (0.5 / n) ** 3 * ((1.0 - n) / 0.5) ** 2,
+        "exponential": np.exp((0.5 - n) / 0.04),
+    }[law]
+    rate = RATE * (n / 0.5) ** 2 * resisting
+    permeability = CONDUCTIVITY * 1e-3 / (1000.0 * 9.81)
+    square = n**3 * 1000.0 * inertial * np.sqrt(resisting / permeability) * (1.0 / 1300.0 + 1.0 / 500.0)
+    start = np.hypot(1.0, 0.5)
+    exact = rate / ((rate / start + square) * np.exp(rate * duration) - square)
+    errors = []
+    for courant_number in (0.4, 0.1):
+        changes = {
+            "numerics.spacing_m": 0.5,
+            "numerics.courant_number": courant_number,
+            "gravity.acceleration_m_per_s2": 0.0,
+            "flow.shape": BLOCK,
+            "flow.velocity_m_per_s": [0.0, 0.0],
+            "flow.initial_stress": "zero",
+            "flow.material.hydraulic_conductivity_m_per_s": CONDUCTIVITY,
+            "flow.material.porosity_update": True,
+            "flow.material.conductivity_law": law,
+            "flow.material.inertial_drag_coefficient": inertial,
+            "output.end_time_s": duration,
+        }
+        simulation = Simulation(load_scene("case_1", **changes))
+        volume = simulation._point_arrays["volume"]
+        volume.assign(ratio * volume.numpy())
+        simulation.set_points(liquid_velocity=np.tile([1.0, -0.5], (simulation.material_points, 1)))
+        simulation.advance(duration)
+        points = simulation.points()
+        middle = (np.abs(points["position"] - [-10.0, 6.0]) < 0.5).all(axis=1)
+        assert points["porosity"][middle] == pytest.approx(n, abs=1e-3)
+        slip = (points["liquid_velocity"] - points["solid_velocity"])[middle].mean(axis=0)
+        errors.append(np.hypot(*slip) / exact - 1.0)
+    assert 0.0 < errors[1] < 0.35 * errors[0]
+    assert abs(4.0 * errors[1] - errors[0]) / 3.0 < 0.02
+
+
+def test_a_conductivity_that_follows_needs_a_porosity_that_does(load_scene):
+    follows = {"flow.material.conductivity_law": "kozeny_carman"}
+    with pytest.raises(
+        ScenarioError, match='conductivity_law = "kozeny_carman" is not allowed with porosity_update = f'
+    ):
+        load_scene("case_1", **follows)
+    both = follows | {"flow.material.porosity_update": True}
+    with pytest.raises(
+        ScenarioError, match=r'conductivity_law = "kozeny_carman" is not allowed with numerics\.drag = "ex'
+    ):
+        load_scene("case_1", **both, **{"numerics.drag": "explicit"})
+    scenario = load_scene("case_1", **both)
+    for rule in effect_rules(scenario):
+        scenario.replaced(rule.switched)

@@ -104,8 +104,8 @@ def plan(scenario: Scenario, *, quick: bool) -> list[Setting]:
     )
     at = own * KNOB_SPACING
     for knob, levels in KNOBS.items():
-        # Other formulations have no drag, and inertial drag is implicit alone: nothing to turn there.
-        if knob == "drag" and (not isinstance(flow, TwoPhaseFlow) or flow.material.inertial_drag_coefficient > 0.0):
+        # Other formulations have no drag, and some drag is implicit alone: nothing to turn there.
+        if knob == "drag" and not (isinstance(flow, TwoPhaseFlow) and flow.material.may_be_explicit):
             continue
         for level in levels:
             if level != getattr(scenario.numerics, knob):

@@ -309,6 +309,11 @@ class TwoPhaseMaterial(UndrainedMaterial):
         return self
 
     @property
+    def may_be_explicit(self) -> bool:
+        """Whether its drag may be integrated explicitly: it is linear in the slip, and stays as it is."""
+        return self.inertial_drag_coefficient == 0.0 and self.conductivity_law == "constant"
+
+    @property
     def hydraulic_conductivity(self) -> float:
         """k_sat [m/s] at 9.81 m/s², given or from κ ρ_L g / μ_L."""
         if self.hydraulic_conductivity_m_per_s is not None:

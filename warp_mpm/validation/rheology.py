@@ -493,6 +493,11 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "mohr_coulomb, φ' = 20°": ("case_1", {}),
     "the same, liquefied at the start": ("case_1", {"flow.initial_pore_pressure_ratio": 1.0}),
     "the same, inertial drag (Ergun)": ("case_1", {"flow.material.inertial_drag_coefficient": 0.404}),
+    "the same, loose: solid fraction 0.50 of 0.56": ("case_1_loose", {}),
+    "the same, dense: 0.50 of 0.44": (
+        "case_1_loose",
+        {"flow.material.dilatancy.critical_solid_fraction": 0.44},
+    ),
     "coulomb_viscous, 20°, 200 Pa s": ("case_1", {"law": "coulomb_viscous", "mixture_viscosity_Pa_s": 200.0}),
     "coulomb_viscous, 20°, 2000 Pa s": ("case_1", {"law": "coulomb_viscous", "mixture_viscosity_Pa_s": 2000.0}),
     "mu_i, 0.38 to 0.64, 10 mm": ("case_1_mu_i", {}),
