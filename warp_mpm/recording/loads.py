@@ -8,7 +8,6 @@ process that is killed leaves a file that opens.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,8 @@ import numpy as np
 from warp_mpm.kernels import layout as at
 from warp_mpm.quantities.time_series import liquid as holds_liquid
 from warp_mpm.quantities.time_series import two_phases
-from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.hdf5 import FILE_OPTIONS, bring_to_disk, failures_of_the_disk, reopened
 from warp_mpm.recording.schedule import Schedule
-from warp_mpm.recording.snapshots import FILE_OPTIONS, failures_of_the_disk
 from warp_mpm.simulator.bodies.loads import Stretch
 
 MEANINGS = {
@@ -56,21 +54,13 @@ class LoadsRecorder:
             return
         self.schedule.count, self._rows = mark["records"], mark["rows"]
         self._before = (mark["time"], np.array(mark["taken"])) if mark["rows"] else None
-        try:
-            self._file = file = h5py.File(path, "r+", **FILE_OPTIONS)
+        with reopened(path) as file:
             if int(file.attrs["rows"]) < self._rows:
                 raise ValueError("it does not reach to the checkpoint")
+            self._file = file
             for dataset in self._datasets():
                 dataset.resize(self._room, axis=0)
             file.attrs.modify("rows", self._rows)
-            file.flush()
-        except (OSError, KeyError, ValueError, RuntimeError) as error:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-            if isinstance(error, OSError) and error.errno is not None:
-                raise RunFolderError(f"{path} cannot be read: {os.strerror(error.errno)}.") from None
-            raise RunFolderError(f"{path} is damaged: {error}.") from None
 
     def _datasets(self) -> list[h5py.Dataset]:
         """Those with a row for each time."""
@@ -84,12 +74,7 @@ class LoadsRecorder:
     def mark(self) -> dict[str, Any]:
         """Bring everything to the disk and tell where the file stands."""
         assert self._file is not None
-        self._file.flush()
-        descriptor = os.open(self._path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        bring_to_disk(self._file, self._path)
         time, taken = self._before if self._before is not None else (0.0, np.zeros(0))
         return {"records": self.schedule.count, "rows": self._rows, "time": time, "taken": taken.tolist()}
 

@@ -7,9 +7,7 @@ unit of a field is its data set's attribute `unit`: a slash in a name would be a
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +15,10 @@ import h5py
 import numpy as np
 
 from warp_mpm.quantities.points import POINT_FIELDS
-from warp_mpm.recording.run_folder import RunFolderError
+from warp_mpm.recording.hdf5 import FILE_OPTIONS, bring_to_disk, failures_of_the_disk, reopened
 from warp_mpm.recording.schedule import Schedule
 
 VTK_VERTEX = 1
-
-FILE_OPTIONS = {"libver": ("earliest", "v108"), "locking": False, "rdcc_nbytes": 0}
-"""Newer versions of the format mark a file that is open for writing, and a mark left by a killed process bars readers.
-Without a cache for chunks, numbers go to the file as they are written, not at some later flush."""
 
 FILLED = (
     "Points",
@@ -73,8 +67,8 @@ class SnapshotRecorder:
     def _reopen(self, mark: Mapping[str, int]) -> None:
         self.schedule.count = mark["records"]
         self._count, self._points = mark["snapshots"], mark["points"]
-        try:
-            self._file = file = h5py.File(self._path, "r+", **FILE_OPTIONS)
+        with reopened(self._path) as file:
+            self._file = file
             self._root = root = file["VTKHDF"]
             self._steps = steps = root["Steps"]
             if min(len(steps["Values"]), int(steps.attrs["NSteps"])) < self._count:
@@ -92,14 +86,6 @@ class SnapshotRecorder:
             steps["Values"].resize(self._count, axis=0)
             steps.attrs.modify("NSteps", self._count)
             self._filled = {name: root[name] for name in FILLED}
-            file.flush()
-        except (OSError, KeyError, ValueError, RuntimeError) as error:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-            if isinstance(error, OSError) and error.errno is not None:  # of the system, not of what is in the file
-                raise RunFolderError(f"{self._path} cannot be read: {os.strerror(error.errno)}.") from None
-            raise RunFolderError(f"{self._path} is damaged: {error}.") from None
 
     def _set_constants(self) -> None:
         """Numbers that are the same for every snapshot, over the whole room."""
@@ -113,12 +99,7 @@ class SnapshotRecorder:
     def mark(self) -> dict[str, int]:
         """Bring everything to the disk and tell where the file stands."""
         assert self._file is not None
-        self._file.flush()
-        descriptor = os.open(self._path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        bring_to_disk(self._file, self._path)
         return {"records": self.schedule.count, "snapshots": self._count, "points": self._points}
 
     def record(self, simulation: Any) -> None:
@@ -263,17 +244,6 @@ class SnapshotRecorder:
             group.id, name.encode(), h5py.h5t.py_create(np.dtype(kind), logical=True), space, dcpl=creation
         )
         return h5py.Dataset(identifier)
-
-
-@contextlib.contextmanager
-def failures_of_the_disk() -> Iterator[None]:
-    """HDF5 reports them as errors of any kind, with its whole life in the message."""
-    try:
-        yield
-    except (OSError, RuntimeError, ValueError) as error:
-        text = str(error)
-        reason = text.partition("error message = '")[2].partition("'")[0]
-        raise OSError(reason or text.partition("\n")[0]) from None
 
 
 def _vtk_shape(values: np.ndarray) -> tuple[int, ...]:
