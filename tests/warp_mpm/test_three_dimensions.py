@@ -306,7 +306,7 @@ def test_a_collapse_in_a_channel_is_that_of_the_plane(formulation):
         ):
             assert deep[name] / 0.5 == pytest.approx(flat[name], rel=tolerance), name
     layers = space.points()["position"].reshape(4, -1, 3)
-    np.testing.assert_allclose(layers[:, :, :2], np.tile(plane.points()["position"], (4, 1, 1)), atol=5e-3)
+    np.testing.assert_allclose(layers[:, :, :2], np.tile(plane.points()["position"], (4, 1, 1)), rtol=0.0, atol=1e-2)
 
 
 @pytest.mark.slow
@@ -347,7 +347,7 @@ def test_waves_in_a_closed_channel_are_those_of_the_plane(formulation, transfer)
             plain_part = layer if components is None else layer[:, :components]
             np.testing.assert_allclose(plain_part, values, rtol=0.0, atol=1e-10 * scale, err_msg=name)
     assert np.abs(flat["solid_velocity"]).max() > 0.01  # it has not come to rest yet
-    assert flat["deviatoric_strain"].max() > 0.005
+    assert flat["deviatoric_strain"].max() > 2e-3
     assert np.abs(there["solid_velocity"][:, 2]).max() < 1e-10
 
 
