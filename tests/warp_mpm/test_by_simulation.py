@@ -4,6 +4,7 @@ import csv
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from analytic.reliability import Distribution
-from warp_mpm.by_simulation.barrier import Question, answer_scenario, lightest, mass, objective_of
+from warp_mpm.by_simulation.barrier import Question, answer_scenario, check_ranges, lightest, mass, objective_of
 from warp_mpm.by_simulation.fields import freed, number_at, read_range, with_values, words
 from warp_mpm.by_simulation.lightest import Box, Search
 from warp_mpm.by_simulation.limits import FARTHEST, excess, limits_of, read_limits
@@ -132,6 +133,7 @@ def test_what_follows_a_field_that_varies(load_scene):
             "--vary barrier.shape.crest leads nowhere: there is no crest; barrier.shape has kind",
         ),
         ("flow.velocity_m_per_s.2=1:2", "flow.velocity_m_per_s has entries 0 to 1"),
+        ("barriers.0.shape.height_m=1:2", r"leads into the list barriers, whose entries do not vary"),
         ("title=1:2", "--vary title is no number of the scenario"),
         (f"{CREST}=4:1", "LOW must be less than HIGH"),
         (f"{CREST}=four", "it must read FIELD=LOW:HIGH"),
@@ -139,7 +141,7 @@ def test_what_follows_a_field_that_varies(load_scene):
 )
 def test_what_cannot_vary(load_scene, text, sentence):
     with pytest.raises(ValueError, match=sentence):
-        read_range(text, load_scene("case_1"))
+        read_range(text, load_scene("site_two_barriers" if "barriers" in text else "case_1"))
 
 
 def test_ranges_and_words(load_scene):
@@ -323,6 +325,29 @@ def test_two_variables_and_the_height_that_holds_a_share(scene, tmp_path):
     answer = lightest(alone, stand_in())
     assert answer.confirmed is None
     assert answer.best.point[0] == pytest.approx(2.0 * math.log(20.0), rel=0.02)
+
+
+def test_an_answer_that_nothing_was_asked_of_says_so(scene):
+    """A flow that does not get there, and a barrier that cannot move."""
+    asked = question(scene, ["displacement <= 1 m"], f"{CREST}=8:20", fine=None)
+    untouched, fixed = "The flow pushed on no barrier by t = ", "The barrier is fixed and does not move"
+
+    def never_there(scenarios):
+        return [replace(run, figures=run.figures | {"peak_force_filtered": 0.0}) for run in stand_in()(scenarios)]
+
+    for runs, said in ((stand_in(), False), (never_there, True)):
+        assert any(one.startswith(untouched) for one in lightest(asked, runs).remarks) == said
+    held = scene.replaced({"barrier.motion": {"kind": "fixed"}, "design": {"density_kg_per_m3": 2000.0}})
+    answer = lightest(question(held, ["displacement <= 1 m"], f"{CREST}=8:20", fine=None), stand_in())
+    assert any(one.startswith(fixed) for one in answer.remarks)
+    assert not any(one.startswith(fixed) for one in lightest(asked, stand_in()).remarks)
+
+
+def test_what_varies_must_change_what_is_to_be_least(scene):
+    for path in ("flow.velocity_m_per_s.0=8:12", "barrier.motion.base_friction=0.2:0.4"):
+        with pytest.raises(ValueError, match=r"does not change the mass of the barrier, which is to be least"):
+            check_ranges(question(scene, ["displacement <= 1"], path))
+    check_ranges(question(scene, ["displacement <= 1"], "flow.velocity_m_per_s.0=8:12", f"{CREST}=3:4"))
 
 
 def test_what_is_made_least(scene):

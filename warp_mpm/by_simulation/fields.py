@@ -135,6 +135,9 @@ def _holder(scenario: Scenario, path: str, option: str = "--vary") -> tuple[Any,
         if depth == len(parents):
             return place, name
         place = place[int(parent)] if listed else getattr(place, parent)
+        if listed and isinstance(place, BaseModel):
+            where = ".".join(path.split(".")[:depth])
+            raise ValueError(f"{option} {path} leads into the list {where}, whose entries do not vary.")
     raise AssertionError(path)
 
 
