@@ -19,7 +19,7 @@ from warp_mpm.by_simulation.limits import FARTHEST, excess, limits_of, read_limi
 from warp_mpm.by_simulation.pictures import search_chart, study_chart
 from warp_mpm.by_simulation.runs import MARK, Run, RunError, Runs, claim, coarse
 from warp_mpm.by_simulation.tables import content, rows, study_content, study_told, told
-from warp_mpm.by_simulation.uncertain import Uncertain, design_of, fitted, study
+from warp_mpm.by_simulation.uncertain import Uncertain, design_of, fitted, read_uncertain, study
 from warp_mpm.cli import app
 from warp_mpm.engine import Ended
 from warp_mpm.plotting import save
@@ -333,7 +333,7 @@ def test_an_answer_that_nothing_was_asked_of_says_so(scene):
     untouched, fixed = "The flow pushed on no barrier by t = ", "The barrier is fixed and does not move"
 
     def never_there(scenarios):
-        return [replace(run, figures=run.figures | {"peak_force_filtered": 0.0}) for run in stand_in()(scenarios)]
+        return [replace(run, figures=run.figures | {"peak_force": 0.0}) for run in stand_in()(scenarios)]
 
     for runs, said in ((stand_in(), False), (never_there, True)):
         assert any(one.startswith(untouched) for one in lightest(asked, runs).remarks) == said
@@ -453,6 +453,26 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
 def fewer_samples(monkeypatch):
     monkeypatch.setattr("warp_mpm.by_simulation.uncertain.SAMPLES", 2**15)
     monkeypatch.setattr("warp_mpm.by_simulation.uncertain.INDEX_SAMPLES", 2**11)
+
+
+def test_what_is_cut_off_and_what_never_hit_is_told(load_scene, fewer_samples):
+    scenario = load_scene("case_1")
+    wide = read_uncertain("flow.material.porosity=normal(0.5, 0.4)", scenario)
+    within = float(np.diff(stats.norm.cdf([(wide.low - 0.5) / 0.4, (wide.high - 0.5) / 0.4]))[0])
+    assert wide.cut == pytest.approx(1.0 - within)
+    narrow = read_uncertain("flow.velocity_m_per_s.0=normal(10, 1)", scenario)
+    assert narrow.cut == 0.0
+
+    def remarks(uncertain, peak):
+        plan = design_of(scenario, [uncertain], 16, spacing=0.75)
+        figures = {"displacement": 1.0, "peak_force": peak}
+        return study(plan, [], [Run(scene, figures, None, 0.1) for scene in plan.scenes()]).remarks
+
+    (cut,) = remarks(wide, 1e5)
+    assert cut.startswith(f"{wide.cut:.1%} of flow.material.porosity=normal(0.5, 0.4) lies outside [")
+    (idle,) = remarks(narrow, None)
+    assert idle.startswith("In 16 of 16 runs the flow did not push on the barrier by t = ")
+    assert remarks(narrow, 1e5) == []
 
 
 def test_a_surrogate_of_a_known_function(load_scene, tmp_path, fewer_samples):
@@ -581,6 +601,7 @@ class Here(InThisProcess):
         (["design", "--limit", "displacement <= 1", *["--vary", CREST, "--vary", HEIGHT, "--vary", "ground.friction"]],
          "--vary is given 3 times; one or two fields may vary."),
         (["design", "--limit", "displacement <= 1", "--vary", CREST, "--vary", CREST], "is given twice"),
+        (["uncertainty", "--vary", "numerics.spacing_m=uniform(0.4, 0.8)"], "all trials have the spacing of --spacing"),
         (["design", "--limit", "displacement <= 1", "--confirm", "2"], "--confirm = 2 is not allowed; it must be"),
         (["design", "--limit", "displacement <= 1", "--minimize", "cost"], "--minimize cost leads nowhere"),
         (["design", "--limit", "displacement <= 1", "--vary", "barrier.shape.face_angle_deg=80:95"],

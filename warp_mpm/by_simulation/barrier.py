@@ -18,7 +18,7 @@ from warp_mpm.accuracy.errors import extrapolate
 from warp_mpm.by_simulation.fields import Range, number_at, with_values
 from warp_mpm.by_simulation.lightest import Box, Point, Search, Tried
 from warp_mpm.by_simulation.limits import DESIGN_FIELDS, DISPLACEMENTS, Limit, excess
-from warp_mpm.by_simulation.runs import Run, coarse
+from warp_mpm.by_simulation.runs import Run, coarse, untouched
 from warp_mpm.scenario import Fixed, Scenario, Sliding, Trapezoid
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.site import notes_still_true
@@ -422,8 +422,7 @@ def _remark(answer: Answer) -> None:
             f"{question.scenario.output.end_time_s:g} s; their displacement counts as broken. With a later "
             "output.end_time_s they may hold."
         )
-    pushed = [run.figures.get("peak_force_filtered") for _, run in answer.tried if run.figures is not None]
-    if pushed and all(force == 0.0 for force in pushed):
+    if answer.tried and all(untouched(run) for _, run in answer.tried):
         remarks.append(
             f"The flow pushed on no barrier by t = {question.scenario.output.end_time_s:g} s: what kept the limits was "
             "not tried by it."
