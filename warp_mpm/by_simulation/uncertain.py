@@ -376,8 +376,8 @@ def _remark(found: Study, good: NDArray[np.bool_]) -> None:
         if uncertain.cut > LEAST_CUT:
             typed_as = f"{uncertain.path}={uncertain.distribution}"
             found.remarks.append(
-                f"{uncertain.cut:.1%} of {typed_as} lies outside [{uncertain.low:g}, {uncertain.high:g}], which the field "
-                "takes; it is cut off, and the rest made the whole."
+                f"{uncertain.cut:.1%} of {typed_as} lies outside [{uncertain.low:g}, {uncertain.high:g}], which the "
+                "field takes; it is cut off, and the rest made the whole."
             )
     idle = sum(map(untouched, found.runs))
     if idle:
