@@ -4,6 +4,7 @@ import csv
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,14 +12,14 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from analytic.reliability import Distribution
-from warp_mpm.by_simulation.barrier import Question, answer_scenario, lightest, mass, objective_of
+from warp_mpm.by_simulation.barrier import Question, answer_scenario, check_ranges, lightest, mass, objective_of
 from warp_mpm.by_simulation.fields import freed, number_at, read_range, with_values, words
 from warp_mpm.by_simulation.lightest import Box, Search
 from warp_mpm.by_simulation.limits import FARTHEST, excess, limits_of, read_limits
 from warp_mpm.by_simulation.pictures import search_chart, study_chart
 from warp_mpm.by_simulation.runs import MARK, Run, RunError, Runs, claim, coarse
 from warp_mpm.by_simulation.tables import content, rows, study_content, study_told, told
-from warp_mpm.by_simulation.uncertain import Uncertain, design_of, fitted, study
+from warp_mpm.by_simulation.uncertain import Uncertain, design_of, fitted, read_uncertain, study
 from warp_mpm.cli import app
 from warp_mpm.engine import Ended
 from warp_mpm.plotting import save
@@ -133,6 +134,7 @@ def test_what_follows_a_field_that_varies(load_scene):
             "--vary barrier.shape.crest leads nowhere: there is no crest; barrier.shape has kind",
         ),
         ("flow.velocity_m_per_s.2=1:2", "flow.velocity_m_per_s has entries 0 to 1"),
+        ("barriers.0.shape.height_m=1:2", r"leads into the list barriers, whose entries do not vary"),
         ("title=1:2", "--vary title is no number of the scenario"),
         (f"{CREST}=4:1", "LOW must be less than HIGH"),
         (f"{CREST}=four", "it must read FIELD=LOW:HIGH"),
@@ -140,7 +142,7 @@ def test_what_follows_a_field_that_varies(load_scene):
 )
 def test_what_cannot_vary(load_scene, text, sentence):
     with pytest.raises(ValueError, match=sentence):
-        read_range(text, load_scene("case_1"))
+        read_range(text, load_scene("site_two_barriers" if "barriers" in text else "case_1"))
 
 
 def test_ranges_and_words(load_scene):
@@ -326,6 +328,29 @@ def test_two_variables_and_the_height_that_holds_a_share(scene, tmp_path):
     assert answer.best.point[0] == pytest.approx(2.0 * math.log(20.0), rel=0.02)
 
 
+def test_an_answer_that_nothing_was_asked_of_says_so(scene):
+    """A flow that does not get there, and a barrier that cannot move."""
+    asked = question(scene, ["displacement <= 1 m"], f"{CREST}=8:20", fine=None)
+    untouched, fixed = "The flow pushed on no barrier by t = ", "The barrier is fixed and does not move"
+
+    def never_there(scenarios):
+        return [replace(run, figures=run.figures | {"peak_force": 0.0}) for run in stand_in()(scenarios)]
+
+    for runs, said in ((stand_in(), False), (never_there, True)):
+        assert any(one.startswith(untouched) for one in lightest(asked, runs).remarks) == said
+    held = scene.replaced({"barrier.motion": {"kind": "fixed"}, "design": {"density_kg_per_m3": 2000.0}})
+    answer = lightest(question(held, ["displacement <= 1 m"], f"{CREST}=8:20", fine=None), stand_in())
+    assert any(one.startswith(fixed) for one in answer.remarks)
+    assert not any(one.startswith(fixed) for one in lightest(asked, stand_in()).remarks)
+
+
+def test_what_varies_must_change_what_is_to_be_least(scene):
+    for path in ("flow.velocity_m_per_s.0=8:12", "barrier.motion.base_friction=0.2:0.4"):
+        with pytest.raises(ValueError, match=r"does not change the mass of the barrier, which is to be least"):
+            check_ranges(question(scene, ["displacement <= 1"], path))
+    check_ranges(question(scene, ["displacement <= 1"], "flow.velocity_m_per_s.0=8:12", f"{CREST}=3:4"))
+
+
 def test_what_is_made_least(scene):
     assert objective_of(scene, "mass").of(scene) == scene.barrier.mass
     assert objective_of(scene, "area").of(scene) == pytest.approx(scene.barrier.mass / 2000.0)
@@ -429,6 +454,26 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
 def fewer_samples(monkeypatch):
     monkeypatch.setattr("warp_mpm.by_simulation.uncertain.SAMPLES", 2**15)
     monkeypatch.setattr("warp_mpm.by_simulation.uncertain.INDEX_SAMPLES", 2**11)
+
+
+def test_what_is_cut_off_and_what_never_hit_is_told(load_scene, fewer_samples):
+    scenario = load_scene("case_1")
+    wide = read_uncertain("flow.material.porosity=normal(0.5, 0.4)", scenario)
+    within = float(np.diff(stats.norm.cdf([(wide.low - 0.5) / 0.4, (wide.high - 0.5) / 0.4]))[0])
+    assert wide.cut == pytest.approx(1.0 - within)
+    narrow = read_uncertain("flow.velocity_m_per_s.0=normal(10, 1)", scenario)
+    assert narrow.cut == 0.0
+
+    def remarks(uncertain, peak):
+        plan = design_of(scenario, [uncertain], 16, spacing=0.75)
+        figures = {"displacement": 1.0, "peak_force": peak}
+        return study(plan, [], [Run(scene, figures, None, 0.1) for scene in plan.scenes()]).remarks
+
+    (cut,) = remarks(wide, 1e5)
+    assert cut.startswith(f"{wide.cut:.1%} of flow.material.porosity=normal(0.5, 0.4) lies outside [")
+    (idle,) = remarks(narrow, None)
+    assert idle.startswith("In 16 of 16 runs the flow did not push on the barrier by t = ")
+    assert remarks(narrow, 1e5) == []
 
 
 def test_a_surrogate_of_a_known_function(load_scene, tmp_path, fewer_samples):
@@ -557,6 +602,7 @@ class Here(InThisProcess):
         (["design", "--limit", "displacement <= 1", *["--vary", CREST, "--vary", HEIGHT, "--vary", "ground.friction"]],
          "--vary is given 3 times; one or two fields may vary."),
         (["design", "--limit", "displacement <= 1", "--vary", CREST, "--vary", CREST], "is given twice"),
+        (["uncertainty", "--vary", "numerics.spacing_m=uniform(0.4, 0.8)"], "all trials have the spacing of --spacing"),
         (["design", "--limit", "displacement <= 1", "--confirm", "2"], "--confirm = 2 is not allowed; it must be"),
         (["design", "--limit", "displacement <= 1", "--minimize", "cost"], "--minimize cost leads nowhere"),
         (["design", "--limit", "displacement <= 1", "--vary", "barrier.shape.face_angle_deg=80:95"],

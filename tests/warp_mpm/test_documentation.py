@@ -8,22 +8,25 @@ pages share one folder, as they do on a reader's machine.
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import analytic.cli
 import fmu.cli
 import warp_mpm.cli
 from warp_mpm.commands.plot import Kind
+from warp_mpm.scenario import Scenario
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("index", "api")
 HOW_TO = (f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md")))
-PAGES = ("../README", "index", "tutorial", "api", *HOW_TO)
+PAGES = ("../README", "index", "ten_minutes", "tutorial", "api", *HOW_TO)
 
 BLOCK = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
@@ -139,10 +142,35 @@ def test_navigation_leads_to_pages():
         assert (ROOT / "docs" / page).is_file(), page
 
 
+def test_the_gallery_has_every_scene():
+    """As `python docs/gallery.py` writes it."""
+    gallery = runpy.run_path(str(ROOT / "docs/gallery.py"))
+    scenes = gallery["shown"]()
+    assert len(scenes) > 20
+    wanted = "".join(gallery["entry"](name, Scenario.load(file)) for name, file in scenes.items())
+    assert (ROOT / "docs/gallery.md").read_text() == gallery["HEAD"] + wanted
+    assert {path.stem for path in (ROOT / "docs/images/gallery").glob("*.png")} == set(scenes)
+
+
+def test_ten_minutes_are_typed_as_printed():
+    """What the script that times the page types is what stands on it, and every option is one."""
+    timed = runpy.run_path(str(ROOT / "docs/ten_minutes.py"))["commands"]()
+    assert timed[0].startswith("python3 -m venv")
+    assert timed[1].startswith("pip install warp_mpm_impact")
+    verbs = [line.split()[3] for line in timed[2:]]
+    assert verbs == ["init", "check", "design", "run", "report"]
+    for verb, line in zip(verbs, timed[2:], strict=True):
+        help_text = CliRunner().invoke(warp_mpm.cli.app, [verb, "--help"], env={"COLUMNS": "200"}).stdout
+        for option in re.findall(r" (--[a-z-]+)", line):
+            assert option in help_text, line
+
+
 @pytest.mark.slow  # the page of the API has the same calls
 def test_notebook_runs(folder):
     """Its cells one after the other, as a notebook runs them; Jupyter itself is not needed for that."""
     cells = json.loads((ROOT / "docs/notebook.ipynb").read_text())["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] for cell in code)  # as they are read where nobody runs them
     lines = [line for cell in cells if cell["cell_type"] == "code" for line in [*cell["source"], "\n"]]
     program = "\n".join(line.rstrip("\n") for line in lines if not line.startswith("%"))
     answer = subprocess.run(

@@ -39,12 +39,16 @@ def help_examples():
             yield shlex.split(example)
 
 
+STUDIES = ("design", "uncertainty")
+"""Commands whose folder has their name before the scenario's."""
+
+
 def made(words):
     """Run folders that a command makes: {folder: the inputs that it is made of}."""
     if words[:2] == ["make", "run"]:
         (line,) = re.findall(r"python (-m warp_mpm run .*)", (ROOT / "Makefile").read_text())
         words = ["python", *line.split()]
-    if words[:3] != ["python", "-m", "warp_mpm"] or words[3] not in ("run", "sweep"):
+    if words[:3] != ["python", "-m", "warp_mpm"] or words[3] not in ("run", "sweep", *STUDIES):
         return {}
     files = []
     for word in words[4:]:
@@ -53,7 +57,8 @@ def made(words):
         files += sorted(glob(word, root_dir=ROOT)) or [word]
     out = words[words.index("--out") + 1] if "--out" in words else None
     if len(files) == 1:
-        return {out or f"runs/{Path(files[0]).stem}": tuple(words)}
+        stem = Path(files[0]).stem
+        return {out or f"runs/{words[3]}_{stem}" if words[3] in STUDIES else out or f"runs/{stem}": tuple(words)}
     return {f"{out or 'runs'}/{Path(file).stem}": tuple(words) for file in files}
 
 

@@ -18,9 +18,9 @@ from warp_mpm.accuracy.errors import extrapolate
 from warp_mpm.by_simulation.fields import Range, number_at, with_values
 from warp_mpm.by_simulation.lightest import Box, Point, Search, Tried
 from warp_mpm.by_simulation.limits import DESIGN_FIELDS, DISPLACEMENTS, Limit, excess
-from warp_mpm.by_simulation.runs import Run, coarse
+from warp_mpm.by_simulation.runs import Run, coarse, untouched
 from warp_mpm.quantities.quantity import of_width
-from warp_mpm.scenario import Scenario, Sliding, Trapezoid
+from warp_mpm.scenario import Fixed, Scenario, Sliding, Trapezoid
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.site import notes_still_true
 
@@ -189,14 +189,22 @@ class Answer:
 
 
 def check_ranges(question: Question) -> None:
-    """See that all corners of the ranges are possible scenes, at the finest spacing too.
+    """See that all corners of the ranges are possible scenes, at the finest spacing too, and that they differ.
 
     Raises:
-        ScenarioError: one is not; the sentence names its values.
+        ScenarioError: one is not possible; the sentence names its values.
+        ValueError: what is to be least is the same at all of them.
     """
     for corner in question.corners:
         question.scene(corner)
         question.scene(corner, question.fine)
+    weights = [question.weigh(corner) for corner in question.corners]
+    if max(weights) - min(weights) <= 1e-9 * abs(max(weights)):
+        paths = " and ".join(one.path for one in question.ranges)
+        raise ValueError(
+            f"--vary {paths} does not change the {question.objective.words}, which is to be least; vary a measure of "
+            "the barrier, or choose something else with --minimize."
+        )
 
 
 def lightest(question: Question, runs: Trials, *, say: Callable[[str], None] = lambda sentence: None) -> Answer:
@@ -415,6 +423,18 @@ def _remark(answer: Answer) -> None:
             f"{question.scenario.output.end_time_s:g} s; their displacement counts as broken. With a later "
             "output.end_time_s they may hold."
         )
+    if answer.tried and all(untouched(run) for _, run in answer.tried):
+        remarks.append(
+            f"The flow pushed on no barrier by t = {question.scenario.output.end_time_s:g} s: what kept the limits was "
+            "not tried by it."
+        )
+    barrier = question.scenario.barrier
+    if (
+        barrier is not None
+        and isinstance(barrier.motion, Fixed)
+        and any(one.name in DISPLACEMENTS for one in question.limits)
+    ):
+        remarks.append("The barrier is fixed and does not move: the limit on its displacement asks for nothing.")
     if answer.best is not None:
         for one, value in zip(question.ranges, answer.best.point, strict=True):
             for end, name in ((one.low, "least"), (one.high, "greatest")):

@@ -135,6 +135,9 @@ def _holder(scenario: Scenario, path: str, option: str = "--vary") -> tuple[Any,
         if depth == len(parents):
             return place, name
         place = place[int(parent)] if listed else getattr(place, parent)
+        if listed and isinstance(place, BaseModel):
+            where = ".".join(path.split(".")[:depth])
+            raise ValueError(f"{option} {path} leads into the list {where}, whose entries do not vary.")
     raise AssertionError(path)
 
 
@@ -211,7 +214,7 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
 
 
 def check_once(texts: Sequence[str]) -> None:
-    """Refuse a field that is varied twice.
+    """Refuse a field that is varied twice, and the spacing, which is that of all trials.
 
     Raises:
         ValueError: one sentence.
@@ -220,3 +223,5 @@ def check_once(texts: Sequence[str]) -> None:
     for path in paths:
         if paths.count(path) > 1:
             raise ValueError(f"--vary {path} is given twice; give it once.")
+        if path == "numerics.spacing_m":
+            raise ValueError(f"--vary {path} is not allowed: all trials have the spacing of --spacing.")

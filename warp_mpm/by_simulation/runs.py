@@ -187,3 +187,11 @@ def coarse(scenario: Scenario, spacing: float | None = None, *, cells: float = C
 def _cost(scenario: Scenario) -> float:
     numerics = scenario.numerics
     return scenario.flow.volume * scenario.output.end_time_s / numerics.spacing_m**3
+
+
+def untouched(run: Run) -> bool:
+    """Whether the flow did not push on the barrier in a run; false where that is not known."""
+    figures = run.figures
+    if figures is None or run.scenario.barrier is None or "peak_force" in figures.get("not_recorded", {}):
+        return False
+    return "peak_force" in figures and not figures["peak_force"]

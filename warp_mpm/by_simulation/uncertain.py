@@ -22,7 +22,7 @@ from scipy.stats import qmc
 from analytic.reliability import Distribution, parse
 from warp_mpm.by_simulation.fields import allowed, number_at, typed, with_values
 from warp_mpm.by_simulation.limits import FIGURES_OF_LIMITS, Limit
-from warp_mpm.by_simulation.runs import Run, coarse
+from warp_mpm.by_simulation.runs import Run, coarse, untouched
 from warp_mpm.quantities import Quantity
 from warp_mpm.scenario import Scenario
 
@@ -46,6 +46,9 @@ LEAST_RUNS = 16
 LEVELS = (0.05, 0.5, 0.95, 0.99)
 """Shares of the quantiles that are told."""
 
+LEAST_CUT = 1e-3
+"""Share of a distribution that is cut off from which on that is told."""
+
 EDGE = 1e-6
 """Share of a distribution left out at each end, where quantiles are infinite."""
 
@@ -58,6 +61,11 @@ class Uncertain:
     distribution: Distribution
     low: float
     high: float
+
+    @property
+    def cut(self) -> float:
+        """Share of the distribution that lies where the field takes no value, and is cut off."""
+        return 1.0 - float(self.distribution._cumulative(self.high) - self.distribution._cumulative(self.low))
 
     def values(self, share: Array) -> Array:
         """Values below which these shares of the distribution lie."""
@@ -80,10 +88,10 @@ def read_uncertain(text: str, scenario: Scenario) -> Uncertain:
             "lognormal(mean, coefficient_of_variation), uniform(low, high) or triangular(low, mode, high)."
         )
     low, high = allowed(scenario, path)
-    inside = found._cumulative(high) - found._cumulative(low)
-    if not inside > 0.5:
+    uncertain = Uncertain(path, found, low, high)
+    if not uncertain.cut < 0.5:
         raise ValueError(f"--vary {path}={found} is mostly outside [{low:g}, {high:g}], which the field takes.")
-    return Uncertain(path, found, low, high)
+    return uncertain
 
 
 @dataclass(frozen=True)
@@ -364,6 +372,19 @@ def _remark(found: Study, good: NDArray[np.bool_]) -> None:
     if failed:
         problem = next(run.problem for run in found.runs if run.problem)
         found.remarks.append(f"{failed} of {len(good)} runs failed and are left out: {problem}")
+    for uncertain in found.design.uncertain:
+        if uncertain.cut > LEAST_CUT:
+            typed_as = f"{uncertain.path}={uncertain.distribution}"
+            found.remarks.append(
+                f"{uncertain.cut:.1%} of {typed_as} lies outside [{uncertain.low:g}, {uncertain.high:g}], which the "
+                "field takes; it is cut off, and the rest made the whole."
+            )
+    idle = sum(map(untouched, found.runs))
+    if idle:
+        found.remarks.append(
+            f"In {idle} of {len(good)} runs the flow did not push on the barrier by t = "
+            f"{found.design.scenario.output.end_time_s:g} s; see whether that is meant."
+        )
     moving = sum(run.figures is not None and run.figures.get("barrier_at_rest") is False for run in found.runs)
     if moving:
         found.remarks.append(

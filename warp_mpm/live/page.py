@@ -89,7 +89,7 @@ class LivePage:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is not None:
+        if isinstance(error, Exception):  # who ends the program at once does not wait for a page
             self._tell_end("failed", f"ended: {error}" if str(error) else "ended")
         self._server.end()
 
