@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warp_mpm.effect_rules import derive_effects, effect_rules, with_law
-from warp_mpm.performance import two_devices
+from warp_mpm.performance import arrival, two_devices
 from warp_mpm.performance.benchmark import OWN_FIELDS, SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
@@ -77,6 +77,25 @@ def test_cost_follows_the_points_and_not_the_domain(load_scene):
         simulation.advance(0.1)
         worked.append(simulation.blocks_in_use * simulation._grid_arrays["block"].size)
     assert worked[1] <= 1.03 * worked[0]
+
+
+def test_what_arrives_is_what_is_there(load_scene):
+    """The two flows whose costs are compared: as many points, of the same volume, none of the second at the start."""
+    simulations = [Simulation(each) for each in arrival.scenes(load_scene("case_1"), 2000)]
+    assert [simulation.material_points for simulation in simulations] == [1960, 1960]
+    volumes = [simulation.scenario.flow.volume for simulation in simulations]
+    assert volumes == pytest.approx([arrival.DEPTH * arrival.LENGTH] * 2)
+    assert len(simulations[0].points(("volume",))["volume"]) == 1960
+    assert len(simulations[1].points(("volume",))["volume"]) == 0
+
+
+@pytest.mark.slow
+def test_the_cost_of_arriving_is_measured(load_scene):
+    table = arrival.arrival_cost(load_scene("case_1"), device="cpu", progress=lambda name: None, points=300)
+    assert [row[0] for row in table.rows] == ["there at the start", "arriving"]
+    assert table.rows[0][1] == table.rows[1][1]
+    assert all(float(row[2]) > 0.0 for row in table.rows)
+    assert table.rows[0][3] == "+0.0%"
 
 
 def test_tables_and_chart(tmp_path):

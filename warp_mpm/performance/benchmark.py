@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 from warp_mpm.effect_rules import with_law, without_liquid
+from warp_mpm.performance.arrival import arrival_cost
 from warp_mpm.performance.machine import processor
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
 from warp_mpm.performance.table import Progress, Table
@@ -36,7 +37,7 @@ def speed_tables(base: Scenario, *, device: str, full: bool, progress: Progress)
     tables = [_ratios(scene, device, progress), _kernels(scene, device, progress)]
     tables += [_sizes(base, device, full, progress), _domains(scene, device, progress), _drag(base, device, progress)]
     tables += [_larger_steps(base, device, progress)]
-    tables += [recording(base, device, progress)]
+    tables += [arrival_cost(base, device=device, progress=progress), recording(base, device, progress)]
     if device == "cpu":
         tables += [first_run(CASE, progress), several_at_once(base.replaced({"output.end_time_s": 4.0}), progress)]
     return tables
