@@ -299,7 +299,7 @@ def _free_stretches(
     is_free = free(s)
     turns = np.flatnonzero(is_free[1:] != is_free[:-1])
     occupied, open_ = np.where(is_free[turns], s[turns + 1], s[turns]), np.where(is_free[turns], s[turns], s[turns + 1])
-    for _ in range(60):
+    for _ in range(60 if len(turns) else 0):
         between = 0.5 * (occupied + open_)
         at_free = free(between)
         open_, occupied = np.where(at_free, between, open_), np.where(at_free, occupied, between)
