@@ -26,7 +26,8 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_the_quantities_of_a_scene_are_those_that_are_sampled(load_scene, name):
     scenario = load_scene(name, **COARSE | SCENES[name])
-    assert quantities_of(scenario) == [key for key in TIME_SERIES if key in Simulation(scenario).sample()]
+    sample = Simulation(scenario).sample()
+    assert quantities_of(scenario) == [key for key in TIME_SERIES if key in sample]
 
 
 def test_what_is_left_out_is_not_computed(load_scene):
