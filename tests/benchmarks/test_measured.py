@@ -312,6 +312,7 @@ KNOWN_SHORT: dict[str, tuple[str, ...]] = {
     "water-behind-a-gate": ("30 mm: ∫", "80 mm: ∫", "window means", "greatest p*", "x = 1.3625 m"),
     "buchner-wall": ("P1: mean", "P1: first peak"),
     "fronts": ("n² = 1, a = 57 mm: front", "H = 0.6 m: front", "Koshizuka and Oka, n² = 2: front"),
+    "loose-wedge": ("head in the middle", "way of the surface"),
     "debris-flume": ("share of the times behind the front", "arrival at 32 m"),
 }
 """Checks that miss their limit today, by words of their quantity; the page tells why."""

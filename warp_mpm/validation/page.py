@@ -44,8 +44,7 @@ Each limit was written into the docstring of its case, with its reason, before t
 below as it stands there; what was changed after a run had been seen says so. What misses its limit stays on this page
 as **short**, with what was tried.
 
-Not compared: dam breaks onto a box and a column (Kleefsman, Yeh and Petroff), which are three-dimensional, and the
-loose wedge of 1999 that liquefied as it failed, which needs a dilatancy that no law here has.
+Not compared: dam breaks onto a box and a column (Kleefsman, Yeh and Petroff), which are three-dimensional.
 
 In the picture a bar across reaches over what was measured, where that is known; a bar upward reaches from the finest
 spacing to the one before.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from warp_mpm.validation.case import Case
-from warp_mpm.validation.measured import debris_flume, field_bounds, fronts, water_on_a_wall
+from warp_mpm.validation.measured import debris_flume, field_bounds, fronts, loose_wedge, water_on_a_wall
 from warp_mpm.validation.measured.given import Given, measured_case
 
 
@@ -53,6 +53,15 @@ def measured_cases(given: Given) -> tuple[Case, ...]:
             "Iverson, Logan, LaHusen and Berti (2010), J. Geophys. Res. 115, F03005, ensemble means and deviations; "
             "settings as published for D-Claw",
             debris_flume.debris_flume,
+            given,
+        ),
+        measured_case(
+            "loose-wedge",
+            "A loose wedge that liquefied as it failed",
+            "About 6 m³ of loose sand and gravel behind a wall on a bed of 31°, brought to failure by water: pore "
+            "pressure in its middle and way of its surface, with dilatancy; without it, and dense, beside it.",
+            "Iverson and others (2000), Science 290:513; settings as published for D-Claw (George and Iverson 2014)",
+            loose_wedge.loose_wedge,
             given,
         ),
         measured_case(
