@@ -25,7 +25,7 @@ STEP = 0.01
 """Communication step of the simulator's units [s]."""
 STEPS_A_TURN = 5
 """Communication steps that each takes before the next has its turn."""
-STARTS = 5
+STARTS = 3
 """Starts of each, in turn."""
 ROUNDS, STEPS = 20, 500
 """Of the closed form: the fastest of so many rounds of so many steps, for other work may hold the processor."""

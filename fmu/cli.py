@@ -243,6 +243,8 @@ def benchmark(
     All are measured in one run and take turns, the plain simulation among them, so that other work on the machine
     changes the ratios little.
     """
+    from fmpy.fmi1 import FMICallException
+
     from analytic.cli.terminal import print_table
     from fmu import archive, c_unit
     from fmu.benchmark import closed_form_costs, simulator_costs
@@ -281,7 +283,7 @@ def benchmark(
                 put_into_page(
                     page, tables, f"{taken_on['processor']}, Python {taken_on['python']}, {taken_on['taken']}"
                 )
-        except (archive.BuildError, ValueError) as error:
+        except (archive.BuildError, FMICallException, ValueError) as error:  # the unit itself has said why
             _refuse(str(error))
 
 
