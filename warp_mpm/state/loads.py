@@ -121,7 +121,8 @@ class LoadsNow:
     def _greatest(self, load: Array) -> Patch:
         """Of loads [n] of the face's slots [N/m]."""
         mean = self.patches.means(load)
-        greatest = int(np.argmax(mean))
+        # Patches that overlap often have the same mean but for rounding: the lowest of them, always.
+        greatest = int(np.argmax(mean >= mean.max() * (1.0 - 1e-9)))
         if not mean[greatest] > 0.0:
             return Patch()
         face = self.slots.face
