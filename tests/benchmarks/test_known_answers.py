@@ -51,7 +51,6 @@ ALONE = (
 run with `slow`; `film`, `hydrostatic`, `rough-slope`, `collapse` and `free-settling` stand for their kind."""
 
 LONG = {
-    "at-rest": "hydrostatic between walls; tests/hard_cases: flows at rest before a barrier",
     "dam-break": "bore and sloshing: the same equations of shallow water, another wave",
     "rotation": "tests/warp_mpm/test_schemes.py: a disc that turns twice",
     "time-step": "tests/warp_mpm/test_time_step.py, and test_schemes.py: a wave at two lengths of the step",

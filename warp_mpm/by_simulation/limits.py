@@ -12,7 +12,7 @@ from typing import Any
 
 from warp_mpm.design_checks import CHECKS, Check
 from warp_mpm.quantities import Quantity
-from warp_mpm.quantities.figures import NUMBERS as FIGURES
+from warp_mpm.quantities.figures import NUMBERS
 from warp_mpm.scenario import Design, Scenario
 from warp_mpm.scenario_errors import ScenarioError
 
@@ -21,7 +21,7 @@ SYNONYMS = {"overtopped": "overtopped_share", "peak": "peak_force_filtered", "ru
 
 FIGURES_OF_LIMITS: Mapping[str, Quantity] = {
     name: quantity
-    for name, quantity in {**FIGURES, **CHECKS}.items()
+    for name, quantity in {**NUMBERS, **CHECKS}.items()
     if name not in ("barrier_at_rest", "barriers", "force_still_rises", "wall_time")
 }
 """What a limit may be on: the numbers of `summary.json` and of its verdict, whose words come first."""

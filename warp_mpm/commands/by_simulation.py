@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 
 from analytic.command_line import INTERRUPTED, complain
 from warp_mpm.commands.options import print_rows
+from warp_mpm.engine import cores
 
 if TYPE_CHECKING:
     from warp_mpm.by_simulation.runs import Runs
@@ -62,7 +62,7 @@ def runs_in(
     from warp_mpm.by_simulation.runs import Runs
 
     try:
-        with Runs(folder, jobs=jobs or os.cpu_count() or 1, device=device, on_progress=on_progress) as runs:
+        with Runs(folder, jobs=jobs or cores(), device=device, on_progress=on_progress) as runs:
             yield runs
     except KeyboardInterrupt:
         complain(f"Interrupted; the runs that ended are in {folder}. The same command goes on from there.")
