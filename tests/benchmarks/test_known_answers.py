@@ -26,8 +26,6 @@ KNOWN_SHORT = {
     "collision": ("slab: kinetic energy lost",),
     # 2.5 % on the coarse grid of the quick variant, 0.2 % on the full one.
     "saturated-wave": ("σ' behind both",),
-    # 6 % in the very cell, 1 % in the one after it.
-    "face-friction": ("0.2 m: T/(N tan δ) on the face, over the material's share in the cell at the face",),
 }
 """Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
 
@@ -36,7 +34,6 @@ WORST = {
     "greatest speed": 0.025,
     "angular momentum": 0.009,
     "displacement at the end": 0.022,
-    "T/(N tan δ)": 0.065,
     "slab: kinetic energy lost": 0.05,
     "σ' behind both": 0.03,
     "beads of 1 mm, a = 4: run-out": 0.15,
