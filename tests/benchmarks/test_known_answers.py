@@ -48,6 +48,8 @@ ALONE = (
 run with `slow`; `film`, `hydrostatic`, `rough-slope`, `collapse` and `free-settling` stand for their kind."""
 
 LONG = {
+    "drag-relaxation": "free-settling; tests/warp_mpm/test_drag.py: explicit and inertial drag",
+    "force-history": "tests/warp_mpm/test_contact.py: reactions are the momentum change",
     "dam-break": "bore and sloshing: the same equations of shallow water, another wave",
     "rotation": "tests/warp_mpm/test_schemes.py: a disc that turns twice",
     "time-step": "tests/warp_mpm/test_time_step.py, and test_schemes.py: a wave at two lengths of the step",

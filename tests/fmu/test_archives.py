@@ -194,6 +194,7 @@ def _table(text: str) -> tuple[list[str], list[list[float]]]:
     return rows[0], [[float(cell) for cell in row] for row in rows[1:]]
 
 
+@pytest.mark.slow  # six workers; test_debris_flow.py: the numbers of the plain simulation
 def test_reference_of_the_simulator_is_reproduced(tmp_path: Path) -> None:
     """With a coarse scenario inside, in all ways to drive it; bit for bit on one machine."""
     scenario = json.loads(archive.DEFAULT_SCENARIO.read_text())

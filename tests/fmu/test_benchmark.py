@@ -14,6 +14,7 @@ from fmu.cli import app
 PAGE = Path(__file__).parents[2] / "docs" / "cosimulation.md"
 
 
+@pytest.mark.slow  # starts every unit; the others below refuse before
 def test_every_unit_has_its_line_in_terminal_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(benchmark, "STARTS", 1)
     page = tmp_path / "page.md"

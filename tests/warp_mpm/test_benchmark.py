@@ -203,6 +203,7 @@ class TestTwoDevices:
         for name in ("bodies", "friction", "sliding", "driven", "passing", "porosity_update"):
             assert True in seen[name], name
 
+    @pytest.mark.slow  # compiles both precisions; the tests above: the scenes and what is told
     def test_throughput_is_told_by_size_and_precision(self, one_scene, monkeypatch):
         monkeypatch.setattr(two_devices, "DRY_RUN_SIZES", (500,))
         table = two_devices.throughput(one_scene, device="cpu", progress=lambda name: None)

@@ -244,7 +244,10 @@ def block(left, right, height):
 
 
 # Undrained there is one velocity, as in a dry flow, and a liquid's pressure, as in a two-phase one.
-@pytest.mark.parametrize("formulation", ["dry", pytest.param("undrained", marks=pytest.mark.slow), "two_phase"])
+@pytest.mark.parametrize(
+    "formulation",
+    [pytest.param("dry", marks=pytest.mark.slow), pytest.param("undrained", marks=pytest.mark.slow), "two_phase"],
+)
 def test_two_sliding_blocks_and_a_pillar(formulation):
     """A pool breaks out on both sides and shoves two blocks of different weight away; a pillar in its middle stands.
 

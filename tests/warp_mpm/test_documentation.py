@@ -24,7 +24,7 @@ from warp_mpm.commands.plot import Kind
 from warp_mpm.scenario import Scenario
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("index", "api")
+QUICK = ("api",)
 HOW_TO = (f"how_to/{path.stem}" for path in sorted((ROOT / "docs/how_to").glob("*.md")))
 PAGES = ("../README", "index", "ten_minutes", "tutorial", "api", *HOW_TO)
 

@@ -268,7 +268,8 @@ def test_no_viscosity_bounds_the_time_step(load_scene, name, law):
         assert step_limits(scene(load_scene, law, name, **own)) == limits
 
 
-@pytest.mark.parametrize("law", LAWS)
+# One law's run by default: the limits above are asked of each.
+@pytest.mark.parametrize("law", [law if law == "mu_i" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS])
 def test_a_run_with_an_extreme_viscosity_takes_the_steps_of_one_without(load_scene, law):
     coarse = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.5}
     # Each in the formulation in which a shipped scene has it, so that its kernels are compiled once.
