@@ -421,7 +421,7 @@ def test_prints_do_not_get_between_the_answers(tmp_path: Path) -> None:
     [
         ('self.simulation._point_arrays["velocity"].fill_(1e6)', "diverged at t ="),
         pytest.param('self.simulation._point_arrays["velocity"].fill_(nan)', "diverged at t =", marks=pytest.mark.slow),
-        ('self.simulation.sample = lambda: {"impact_force_x": nan}', "gave nan for impact_force_x"),
+        ('self.simulation.sample = lambda names: {"impact_force_x": nan}', "gave nan for impact_force_x"),
     ],
 )
 def test_failed_computation_is_reported(poison: str, says: str, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The virtual environment of `make run` and `make test`: made where there is none that will do, or refused."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -32,9 +33,11 @@ def python(path, *, version=None, pip=0):
 def made(folder, interpreter):
     """What `make` answers where the environment is to be in `folder`."""
     stamp = folder / ".run"
+    # The tests are run by make themselves: what it hands down to another make would be told of.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     return subprocess.run(
         ["make", f"PYTHON={interpreter}", f"VENV={folder}", str(stamp)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
+        cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 

@@ -59,7 +59,7 @@ def test_tables_are_numbers_with_their_units(runs, book):
     figures = table(book["Figures"])
     force = figures["peak force F₂ₓ, 0.05 s mean"]
     assert (force["unit"], force[run]) == ("kN/m", pytest.approx(summary["peak_force_filtered"] / 1e3))
-    assert figures["peak force F₂ₓ, 0.05 s mean"]["meaning"].startswith("the same of the force's moving mean")
+    assert figures["peak force F₂ₓ, 0.05 s mean"]["meaning"].startswith("greatest moving mean over 0.05 s")
     assert table(book["Settings"])["numerics.spacing_m"][run] == 0.5
     ledger = table(book["Ledger"])
     assert ledger["error of momentum, relative"][run] == pytest.approx(summary["momentum_error"], rel=1e-15)

@@ -95,6 +95,7 @@ def write(
         versions: of what computed it.
         first: picture above all cases.
     """
+    folder.mkdir(parents=True, exist_ok=True)
     lines = [kind.introduction]
     seconds = sum(result.seconds for result in results)
     lines.append(f"Computed with {versions}; {how}, {seconds:.0f} s on one core ({processor()}).\n")

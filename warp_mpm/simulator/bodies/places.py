@@ -303,6 +303,8 @@ def _free_stretches(
         between = 0.5 * (occupied + open_)
         at_free = free(between)
         open_, occupied = np.where(at_free, between, open_), np.where(at_free, occupied, between)
+    # To a millionth of a cell, so that rounding in the bisection, which hangs on the domain, makes no other run.
+    open_ = np.round(open_ / (1e-6 * grid.spacing)) * (1e-6 * grid.spacing)
     ends = [*([whole[0]] if is_free[0] else []), *open_, *([whole[1]] if is_free[-1] else [])]
     return list(zip(map(float, ends[::2]), map(float, ends[1::2]), strict=True))
 
