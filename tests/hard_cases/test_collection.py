@@ -1,5 +1,7 @@
 """The collection of hard scenes: a dozen of the worst by default, all of them, at half the time step too, when slow."""
 
+import math
+
 import pytest
 
 from warp_mpm.hard_cases.collection import LARGE, hard_cases
@@ -27,22 +29,26 @@ WORST = (
 
 
 def failed(case, measured):
+    """What a case does not meet; no known shortfall is much worse than it was."""
     assert measured.problem is None, measured.problem
-    return {criterion.figure: value for criterion, value in measured.failures(case.scenario)}
+    unmet = {criterion.figure: value for criterion, value in measured.failures(case.scenario)}
+    known = KNOWN_FAILURES.get(case.name, {})
+    assert all(value <= 1.5 * known.get(figure, math.inf) for figure, value in unmet.items()), unmet
+    return unmet
 
 
 @pytest.mark.parametrize("name", WORST)
 def test_the_worst(name):
     (case,) = hard_cases([name])
     unmet = failed(case, measure(case.scenario))
-    assert unmet.keys() <= KNOWN_FAILURES.get(name, frozenset()), unmet
+    assert unmet.keys() <= KNOWN_FAILURES.get(name, {}).keys(), unmet
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", hard_cases(), ids=lambda case: case.name)
 def test_all_at_half_the_time_step_too(case):
     unmet = failed(case, measure(case.scenario, halve=case.name not in LARGE))
-    assert unmet.keys() == KNOWN_FAILURES.get(case.name, frozenset()), unmet
+    assert unmet.keys() == KNOWN_FAILURES.get(case.name, {}).keys(), unmet
 
 
 def test_every_case_says_why_it_is_hard():
