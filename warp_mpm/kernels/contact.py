@@ -54,7 +54,7 @@ def make_contact(
     others)."""
     effects = types.effects
     F = types.scalar
-    V2, X = types.V2, types.X
+    V2, V3, X = types.V2, types.V3, types.X
     V = types.V
     Grid = types.Grid
     Parameters = types.Parameters
@@ -82,20 +82,25 @@ def make_contact(
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
+    def around(contact: Contact, e: wp.int32, wx: V3, wy: V3, k: wp.int32, parameters: Parameters):
+        """Weight and number of the k-th node around a place."""
+        w = wx[(k / 3) % 3] * wy[k % 3]
+        node = contact.first[e] + ((k / 3) % 3) * parameters.rows + k % 3
+        if SPATIAL:
+            w *= contact.weight_z[e][k / 9]
+            node += (k / 9) * parameters.layer
+        return w, node
+
+    @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
         """sum N_i^2 / m_i of the solid, with weights that add up to one over the nodes that have mass; 0 where the flow
         is not at the surface: too few of the nodes have any."""
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         result = F(0.0)
         total = F(0.0)
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
@@ -111,47 +116,32 @@ def make_contact(
     @wp.func
     def seen(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V:
         """Velocities of the flow at the place."""
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         result = V()
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             result += w * read(grid.velocity, node)
         return result
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         result = X()
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             result += w * read(grid.liquid_alone, node)
         return result
 
     @wp.func
     def give(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """Impulses per phase, over the share of the solid's mass that each has, to the nodes."""
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
@@ -160,15 +150,10 @@ def make_contact(
     @wp.func
     def give_scheme(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """The same to what the transfer scheme keeps."""
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
@@ -177,15 +162,10 @@ def make_contact(
 
     @wp.func
     def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
-        first = contact.first[e]
         wx = contact.weight_x[e]
         wy = contact.weight_y[e]
         for k in range(AROUND):
-            w = wx[(k / 3) % 3] * wy[k % 3]
-            node = first + ((k / 3) % 3) * parameters.rows + k % 3
-            if SPATIAL:
-                w *= contact.weight_z[e][k / 9]
-                node += (k / 9) * parameters.layer
+            w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
