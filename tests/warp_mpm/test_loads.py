@@ -197,6 +197,23 @@ def loads_of(load_scene, pressure, times, **changes):
     return found
 
 
+def test_slots_of_an_inclined_face_share_what_its_points_take_in_turns(load_scene):
+    def in_turns(s, t):
+        return 2e5 * (np.floor(s / 0.25) % 2) + 0 * t  # 0 or 200 kPa, slot by slot
+
+    inclined = {"barrier.shape": {"kind": "trapezoid", "base_width_m": 4.0, "crest_width_m": 1.0, "height_m": 3.0}}
+    patch = {"output.pressure_patch_m": 0.25}
+    (upright,) = loads_of(load_scene, in_turns, [0.0, 0.02], **patch)
+    assert upright.pressure_patch.pressure == pytest.approx(2e5)
+    (loads,) = loads_of(load_scene, in_turns, [0.0, 0.02], **inclined | patch)
+    face = loads.slots.face
+    assert loads.pressure_patch.pressure <= 1.52e5  # half of it in the middle, three quarters at an end
+    # The mean over the whole face is that of what acts.
+    (whole,) = loads_of(load_scene, in_turns, [0.0, 0.02], **inclined | {"output.pressure_patch_m": 10.0})
+    middle = 0.5 * (face.edges[1:] + face.edges[:-1])
+    assert whole.pressure_patch.pressure == pytest.approx(in_turns(middle, 0.0).mean())
+
+
 def test_a_patch_is_the_greatest_mean_over_half_a_metre(load_scene):
     def pressure(s, t):
         return (

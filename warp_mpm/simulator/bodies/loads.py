@@ -49,6 +49,11 @@ class Stretch:
         return len(self.edges) - 1
 
     @property
+    def inclined(self) -> bool:
+        """Whether a piece of it runs across the cells, so that the flow is met at points of it."""
+        return bool((np.abs(self.along).max(axis=1) < 1.0 - 1e-9).any())
+
+    @property
     def slots(self) -> slice:
         """Its part of all slots."""
         return slice(self.first, self.first + len(self))
@@ -67,12 +72,20 @@ class Stretch:
 @dataclass(frozen=True)
 class Patches:
     """All patches [P] of one length on a surface that may bear the greatest mean load: the load is even within a slot,
-    so that the greatest one begins or ends at an edge of one."""
+    so that the greatest one begins or ends at an edge of one.
+
+    Points of an inclined surface lie closer than nodes do. Several of them hold the same nodes, and what a node gives
+    is shared between them by where they happen to lie in their cells: in turns too much and too little, with a period
+    of one and a half cells, however fine the cells are. Half of each slot's load is given to its neighbours, which is
+    as finely as the nodes tell it, and goes with the spacing.
+    """
 
     length: float
     """[m]; that of the surface where it is shorter than what was asked for."""
     middle: Array
     """[P] along the surface [m]."""
+    shared: bool
+    """Whether slots share their load with their neighbours."""
     _ends: tuple[tuple[NDArray[np.int64], Array], tuple[NDArray[np.int64], Array]]
     """Slot [P] in which each begins, and ends, and the share [P] of it that lies before that."""
 
@@ -88,10 +101,14 @@ class Patches:
             slot = np.clip(np.floor(reach), 0, len(stretch) - 1).astype(np.int64)
             return slot, reach - slot
 
-        return cls(length, low + 0.5 * length, (place(low), place(low + length)))
+        return cls(length, low + 0.5 * length, stretch.inclined, (place(low), place(low + length)))
 
     def means(self, load: Array) -> Array:
         """Mean [P] over each patch, of loads [n] of the slots [N/m]; a pressure [Pa]."""
+        if self.shared:
+            # A quarter to either side; what would go beyond an end stays, so that the sum does.
+            beyond = np.concatenate([load[:1], load, load[-1:]])
+            load = 0.25 * beyond[:-2] + 0.5 * load + 0.25 * beyond[2:]
         before = np.cumsum(load) - load
         (first, start), (last, end) = self._ends
         return (before[last] + end * load[last] - before[first] - start * load[first]) / self.length
