@@ -34,7 +34,8 @@ CRITERIA = (
         "mass_error",
         1e-12,
         1e-6,
-        "greatest change of each phase's mass, inside and departed together, over its start; rounding of the sum",
+        "greatest change of the mass, inside and departed together, less what has arrived, over it; rounding of the "
+        "sum",
     ),
     Criterion(
         "momentum_error",
@@ -47,8 +48,8 @@ CRITERIA = (
         "energy_error",
         0.01,
         0.01,
-        "greatest energy above what was put in (start, gravity, a driven barrier), over the energy put in; plastic "
-        "flow, drag, friction and the transfer only take energy away",
+        "greatest energy above what was put in (start, gravity, a driven barrier, an inflow), over the energy put in; "
+        "plastic flow, drag, friction and the transfer only take energy away",
     ),
     Criterion(
         "speed_ratio",

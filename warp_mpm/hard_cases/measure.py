@@ -136,10 +136,11 @@ def _energy_error(columns: dict[str, Array], undecided: float) -> float:
     """Greatest energy beyond what was there or put in, over that."""
     parts = [columns[f"flow_{kind}_energy"] for kind in ("kinetic", "gravitational", "elastic")]
     work = columns.get("barrier_work", np.zeros(1))
-    total = sum(parts) + columns["left_energy"] + work - columns.get("seepage_work", 0.0)
+    arrived = columns.get("inflow_energy", np.zeros(1))
+    total = sum(parts) + columns["left_energy"] + work - columns.get("seepage_work", 0.0) - arrived
     # A driven barrier puts energy in by its work, and gravity on a slope by the fall.
     # Of numpy's, since max takes the other where it is offered no number.
-    gained = np.maximum(np.max(-work), 0.0) + np.maximum(np.max(parts[1][0] - parts[1]), 0.0)
+    gained = sum(np.maximum(np.max(part), 0.0) for part in (-work, parts[1][0] - parts[1], arrived))
     put_in = sum(abs(float(part[0])) for part in parts) + undecided + gained
     return float(np.maximum(np.max(total - total[0]) - undecided, 0.0) / np.maximum(put_in, 1e-9))
 
@@ -147,8 +148,8 @@ def _energy_error(columns: dict[str, Array], undecided: float) -> float:
 def _of_the_series(scenario: Scenario, columns: dict[str, Array], undecided_energy: float) -> dict[str, float]:
     figures: dict[str, float] = {}
     inside = columns["solid_mass"] + columns.get("liquid_mass", 0.0)
-    whole = inside + columns["left_mass"]
-    figures["mass_error"] = float(np.abs(whole - whole[0]).max() / whole[0])
+    known = inside[0] + columns.get("inflow_mass", 0.0)
+    figures["mass_error"] = float(np.abs(inside + columns["left_mass"] - known).max() / np.max(known))
     closed = momentum_error(columns, scenario.gravity.acceleration_m_per_s2)
     if closed is not None:
         figures["momentum_error"] = closed
