@@ -246,6 +246,8 @@ def _of_material(scenario: Any) -> list[str]:
         found.append(
             "The flow's dilatancy is left out: whether it liquefies or locks as it arrives is not in the closed form."
         )
-    if flow.initial_pore_pressure_ratio is not None:
+    if flow.pore_pressure_ratio_range is not None:
         found.append("The flow's pore pressure at the start is left out.")
+    if flow.sheared:
+        found.append("How the flow's velocity varies over its depth is left out: the closed form takes the mean.")
     return found

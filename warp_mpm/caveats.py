@@ -109,14 +109,20 @@ def _impossible_start(scenario: Scenario) -> list[str]:
     if flow.initial_stress != "geostatic":
         return []
     found = []
-    liquid = material.liquid_density_kg_per_m3 if isinstance(material, UndrainedMaterial) else 0.0
-    if flow.initial_pore_pressure_ratio is not None:
-        liquid = flow.initial_pore_pressure_ratio * material.density
+    # What the liquid bears of the weight as a density, where it is least and where it is most.
+    liquid = most_liquid = material.liquid_density_kg_per_m3 if isinstance(material, UndrainedMaterial) else 0.0
+    if flow.pore_pressure_ratio_range is not None:
+        liquid, most_liquid = (ratio * material.density for ratio in flow.pore_pressure_ratio_range)
     head = -scenario.gravity.vector[1] * flow.depth
     vertical = (material.density - liquid) * head  # at the base, compression positive
     for field, modulus, pressure, what in (
         ("young_modulus_Pa", material.oedometric_modulus, abs(vertical), "effective stress"),
-        ("liquid_bulk_modulus_Pa", getattr(material, "liquid_bulk_modulus_Pa", math.inf), liquid * head, "pressure"),
+        (
+            "liquid_bulk_modulus_Pa",
+            getattr(material, "liquid_bulk_modulus_Pa", math.inf),
+            most_liquid * head,
+            "pressure",
+        ),
     ):
         if pressure > GREATEST_STRAIN * modulus:
             found.append(

@@ -117,6 +117,8 @@ def _missing(scenario: Scenario, bodies: Sequence[Body]) -> str:
         return "a ground that is not level and all alike (ground.profile_m, ground.stretches)"
     if scenario.flow.inflow is not None:
         return "flow.inflow"
+    if scenario.flow.sheared:
+        return "a velocity that varies over the depth (flow.base_velocity_share, flow.velocity_profile)"
     if len(scenario.flow.materials) > 1:
         return "a deposit with a material of its own (flow.deposits)"
     if 3 not in LAWS.named(law).dimensions:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
 from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Sliding, Trapezoid
 from warp_mpm.scenario.inflow import surges_of
@@ -16,6 +18,9 @@ def described(scenario: Scenario) -> list[str]:
     speed = f"v = {flow.speed:.4g} m/s"
     if scenario.gravity.acceleration_m_per_s2 > 0.0:
         speed += f" (Fr {flow.speed / (scenario.gravity.acceleration_m_per_s2 * flow.depth) ** 0.5:.2f})"
+    if flow.sheared:
+        paces = flow.paces(np.linspace(0.0, 1.0, 1001))
+        speed += f", from {paces.min():.3g} to {paces.max():.3g} of it over the depth"
     slope = "no ground" if ground is None else f"slope {tilt:g}°, {_ground(ground)}"
     material = flow.formulation.replace("_", "-")
     points = (flow.volume + flow.deposited_volume) / numerics.spacing_m**2 * numerics.points_per_cell
@@ -99,6 +104,9 @@ def described_material(scenario: Scenario) -> str:
     if hasattr(material, "hydraulic_conductivity"):
         parts.append(f"k = {material.hydraulic_conductivity:.3g} m/s")
     parts.append(f"E = {material.young_modulus_Pa / 1e6:.4g} MPa")
+    if flow.pore_pressure_ratio_range is not None:
+        least, most = flow.pore_pressure_ratio_range
+        parts.append(f"λ_p = {least:g}" + (f" to {most:g}" if most > least else ""))
     whence = f"by the law {material.law}" if flow.lateral_stress_coefficient is None else "given"
     parts.append(f"K0 = {flow.lateral_stress_ratio:.3g} ({whence})")
     return f"{', '.join(parts)}; L = {flow.equivalent_length:.4g} m, of the box of its volume and depth"

@@ -83,7 +83,8 @@ class _Part:
     """[N] dy/dx of the long slope whose stress it has."""
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
-    velocity: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[float, float] | Array = (0.0, 0.0)
+    """Of all, or [N, 2] [m/s]."""
     material: int = 0
     """Place among the flow's materials."""
 
@@ -190,7 +191,7 @@ def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> Arr
     """
     side = spacing / math.isqrt(points_per_cell)
     way, volume, _ = inflow.profile
-    width = side / float(inflow.paces(np.array([0.0, 1.0])).max())
+    width = side / inflow.greatest_pace
     edges = np.arange(0.0, way[-1] + width, width)
     moving = np.concatenate([[True], np.diff(way) > 0.0])  # where the flow stands still, nothing passes
     until = np.interp(edges, way[moving], volume[moving])
@@ -263,7 +264,8 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     there, and what arrives, in this order.
 
     Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
-    share of the weight; the vertical effective stress carries the rest, and the horizontal ones are K0 times it.
+    share of the weight, constant or along the flow; the vertical effective stress carries the rest, and the horizontal
+    ones are K0 times it.
     Gravity's component along the ground is left out of the initial stress.
 
     Over a profile the stress is that of a long slope of the angle alpha that surface and ground share, the lesser of
@@ -272,9 +274,12 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     """
     flow, numerics = scenario.flow, scenario.numerics
     parts: list[_Part] = []
-    ratio, lateral = flow.initial_pore_pressure_ratio, flow.lateral_stress_ratio
+    lateral = flow.lateral_stress_ratio
+    ratio: float | Array | None
     if flow.shape is not None:
-        parts.append(_Part(*_filled(scenario, flow.shape.polygon), ratio, lateral, flow.velocity_m_per_s))
+        filled = _filled(scenario, flow.shape.polygon)
+        ratio = flow.pore_pressure_ratio(filled[0][:, 0])
+        parts.append(_Part(*filled, ratio, lateral, _velocity(scenario, flow.shape.polygon, *filled[:3])))
     others = 0
     for deposit in flow.deposits:
         own, number = deposit.lateral_stress_coefficient, 0
@@ -287,9 +292,11 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
-        own_ratio = ratio if coming.pore_pressure_ratio is None else coming.pore_pressure_ratio
+        ratio = coming.pore_pressure_ratio
+        if coming.pore_pressure_ratio is None:
+            ratio = flow.pore_pressure_ratio(np.full(len(coming.volume), flow.inflow.x_m))
         slope = np.full(len(coming.volume), flow.inflow.slope)
-        parts.append(_Part(coming.position, coming.volume, coming.below, slope, own_ratio, lateral))
+        parts.append(_Part(coming.position, coming.volume, coming.below, slope, ratio, lateral))
         entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
     stresses = [_initial_stress(scenario, part) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
@@ -300,7 +307,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         liquid_mass=flow.material.liquid_partial_density * volume,
         effective_stress=np.concatenate([effective for effective, _ in stresses]),
         pore_pressure=np.concatenate([pore for _, pore in stresses]),
-        velocity=np.concatenate([np.tile(np.array(part.velocity), (len(part.volume), 1)) for part in parts]),
+        velocity=np.concatenate([np.broadcast_to(part.velocity, (len(part.volume), 2)) for part in parts]),
         entry=entry,
         pace=pace,
         material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
@@ -312,6 +319,25 @@ def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array
     position, volume = fill_polygon(outline, scenario.numerics.spacing_m, scenario.numerics.points_per_cell)
     below = geometry.depth_below_surface(outline, position)
     return position, volume, below, _shared_slope(scenario, outline, position)
+
+
+def _velocity(
+    scenario: Scenario, outline: geometry.Polygon, position: Array, volume: Array, below: Array
+) -> tuple[float, float] | Array:
+    """Velocity [N, 2] of the points of the flow; one for all of them where it does not vary over the depth.
+
+    The momentum is that of the stated velocity, to rounding: what the middles of the points miss of the profile's mean
+    is made good by one factor.
+    """
+    flow = scenario.flow
+    if not flow.sheared:
+        return flow.velocity_m_per_s
+    over = np.array([1.0, -1.0])
+    above = geometry.depth_below_surface(outline * over, position * over)  # the underside, seen from below
+    depth = above + below
+    paces = flow.paces(np.divide(above, depth, out=np.ones(len(depth)), where=depth > 0.0))
+    paces /= np.average(paces, weights=volume)
+    return np.multiply.outer(paces, np.array(flow.velocity_m_per_s))
 
 
 def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:

@@ -92,7 +92,7 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
     time = scenario.output.end_time_s
     travel = barrier_travel(scenario)
     fall = 2.0 * abs(gy) * _height_of_fall(scenario) + 2.0 * abs(gx) * (x_high - x_low)
-    fast = 2.0 * math.sqrt((flow.speed + travel.speed) ** 2 + fall)
+    fast = 2.0 * math.sqrt((flow.greatest_speed + travel.speed) ** 2 + fall)
     rise = min(fast * time, fast**2 / (2.0 * abs(gy)) if gy else math.inf)
     reach = fast * time + 0.5 * abs(gx) * time**2
 
@@ -120,7 +120,7 @@ def domain_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]] = 
         bottom = domain.bottom_m
     else:
         sunk = 0.5 * abs(gy) * time**2 + flow.depth
-        bottom = y_low - (fast * time + sunk if travel.speed else min(reach, flow.speed * time + sunk))
+        bottom = y_low - (fast * time + sunk if travel.speed else min(reach, flow.greatest_speed * time + sunk))
     # A wall at an edge stands still while the grid rides, which must not leave it behind.
     beyond_left = travel.downstream if domain.left_edge == "wall" else 0.0
     beyond_right = travel.upstream if domain.right_edge == "wall" else 0.0
@@ -197,7 +197,7 @@ def _site_extent(scenario: Scenario, vertices: Sequence[NDArray[np.float64]]) ->
     gx, gy = scenario.gravity.vector
     time = scenario.output.end_time_s
     fall = 2.0 * abs(gy) * max(flow_top - lowest, flow.depth) + 2.0 * abs(gx) * (x_high - x_low)
-    fast = 2.0 * math.sqrt((flow.speed + speed) ** 2 + fall)
+    fast = 2.0 * math.sqrt((flow.greatest_speed + speed) ** 2 + fall)
     reach = fast * time + 0.5 * abs(gx) * time**2
     # Upstream a flow spreads as on level ground, unless it may run down there too.
     upstream = ground.profile[ground.profile[:, 0] < float(outline[:, 0].min()), 1]
@@ -242,7 +242,7 @@ def travel_of(barrier: Barrier, scenario: Scenario) -> Travel:
     held = barrier.motion.base_friction_coefficient * abs(gy)
     # The momentum of a flow that is all as fast as its front, shared with the barrier; friction at its base stops it.
     flow_mass = (flow.volume + flow.deposited_volume) * flow.material.density
-    front = flow.speed + 2.0 * math.sqrt(abs(gy) * flow.depth)
+    front = flow.greatest_speed + 2.0 * math.sqrt(abs(gy) * flow.depth)
     pushed = flow_mass / (flow_mass + mass) * front
     slowed = held - gx
     downstream = pushed * time + 0.5 * max(-slowed, 0.0) * time**2

@@ -273,11 +273,15 @@ class Simulation:
         self._since = self.window()
         """When the last call of `advance` that made a step began."""
         moving = (initial.velocity != 0.0).any(axis=1)
+        mass = initial.solid_mass + initial.liquid_mass
         flow_mass = float(initial.solid_mass[moving].sum() + initial.liquid_mass[moving].sum())
         drawn = {"channel": asdict(channel)} if channel is not None else {}
         self._scene_mark = saved.scene_mark(scenario.resolved() | drawn)
         velocities = (*scenario.flow.velocity_m_per_s, 0.0)[: self.effects.dimensions]
         self._initial_momentum = [flow_mass * velocity for velocity in velocities]
+        if scenario.flow.sheared:
+            self._initial_momentum = (mass @ initial.velocity).tolist()
+            self._fit_velocities(initial.position, mass, initial.velocity, initial.there)
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
@@ -524,10 +528,7 @@ class Simulation:
         self._initial_momentum = momentum.tolist()
         self._point_arrays["velocity"].assign(velocity)
         if not {"solid_velocity", "liquid_velocity"}.isdisjoint(state):
-            places = (now["position"] - [self._parameters.left, self._parameters.bottom]) / self.grid.spacing
-            fitted = self.effects.scheme.fitted(places, self.grid.spacing, solid + liquid, velocity)
-            for name, values in fitted.items():
-                self._point_arrays[name].assign(values)
+            self._fit_velocities(now["position"], solid + liquid, velocity, len(velocity))
         self._point_arrays["stress"].assign(now["effective_stress"])
         if self.effects.liquid:
             self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)
@@ -539,6 +540,18 @@ class Simulation:
             slip = liquid @ (now["liquid_velocity"] - now["solid_velocity"])
             balance[at.SEEPAGE_POWER_BEFORE] = slip[:2] @ np.array(self.scenario.gravity.vector)
             self._balance.assign(balance)
+
+    def _fit_velocities(
+        self, position: NDArray[np.float64], mass: NDArray[np.float64], velocity: NDArray[np.float64], there: int
+    ) -> None:
+        """Begin the transfer scheme's own point fields with the velocities [N, ...] of the points [N, 2], of which the
+        first `there` are there."""
+        places = (position[:there] - [self._parameters.left, self._parameters.bottom]) / self.grid.spacing
+        phases = self._types.components // velocity.shape[1]
+        given = np.tile(velocity[:there], (1, phases))
+        for name, values in self.effects.scheme.fitted(places, self.grid.spacing, mass[:there], given).items():
+            rest = np.zeros((len(velocity) - there, values.shape[1]))
+            self._point_arrays[name].assign(np.concatenate([values, rest]))
 
     # -- state -------------------------------------------------------------------------------------------------
 

@@ -148,7 +148,7 @@ def nominal_step(scenario: Scenario) -> float:
     """The step [s] against which times are told apart (`ONE_TIME`, `SHORTEST_RECORD`): the longest that is stable as
     the flow starts, or the shortest interval of the output where that is less."""
     numerics, output, limits = scenario.numerics, scenario.output, step_limits(scenario)
-    stable = min(numerics.spacing_m / (limits.wave_speed + scenario.flow.speed), limits.drag_step)
+    stable = min(numerics.spacing_m / (limits.wave_speed + scenario.flow.greatest_speed), limits.drag_step)
     intervals = (output.time_series_interval_s, output.snapshot_interval_s, output.end_time_s)
     return min(numerics.courant_number * stable, *intervals)
 

@@ -115,6 +115,11 @@ def test_what_it_does_not_know_of_the_law_is_said() -> None:
     case_1 = Scenario.load(folder / "case_1.json")
     liquefied = case_1.replaced({"flow.initial_pore_pressure_ratio": 1.0})
     assert any("pore pressure at the start is left out" in one for one in scene_of(liquefied).remarks)
+    front = case_1.replaced({"flow.initial_pore_pressure_ratios": [[-9.0, 0.6], [-3.0, 1.0]]})
+    assert any("pore pressure at the start is left out" in one for one in scene_of(front).remarks)
+    sheared = case_1.replaced({"flow.base_velocity_share": 0.0})
+    assert any("varies over its depth is left out" in one for one in scene_of(sheared).remarks)
+    assert scene_of(sheared).speed == 10.0
     voellmy = case_1.replaced({"ground.turbulence_m_per_s2": 200.0})
     assert any("friction between flow and ground is left out" in one for one in scene_of(voellmy).remarks)
     for command, runner in (("predict", closed_form), ("parameters", fmu)):

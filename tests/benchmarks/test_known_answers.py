@@ -46,7 +46,16 @@ WORST = {
 """How far a check that falls short may be off today, by words of its quantity; the first that fits counts."""
 
 ALONE = (
-    *("bagnold", "collapse-by-rate", "dilatancy-drained", "dilatancy-undrained", "dry-column", "flume", "heap"),
+    *(
+        "bagnold",
+        "collapse-by-rate",
+        "couette",
+        "dilatancy-drained",
+        "dilatancy-undrained",
+        "dry-column",
+        "flume",
+        "heap",
+    ),
     *("incline", "inertial-settling", "pressure-on-a-slope", "saturated-wave", "spreading", "voellmy"),
 )
 """Cases whose kernels hardly another test needs: compiling them takes longer than the case. Their quick variants are

@@ -131,3 +131,94 @@ def test_a_pore_pressure_ratio_shares_the_weight(load_scene, name, ratio):
 def test_a_pore_pressure_ratio_needs_a_liquid_and_a_weight(load_scene, name, changes, words):
     with pytest.raises(ScenarioError, match=words):
         load_scene(name, **changes | {"flow.initial_pore_pressure_ratio": 0.5})
+
+
+PROFILES = {
+    "linear, at rest on the bed": ({"base_velocity_share": 0.0}, lambda s: 2.0 * s),
+    "Bagnold's power": ({"base_velocity_share": 0.4, "velocity_exponent": 1.5}, lambda s: 0.4 + 0.6 * 2.5 * s**1.5),
+    "a plug": ({"velocity_profile": [[0, 0], [0.5, 3], [1, 3]]}, lambda s: np.minimum(s / 0.5, 1.0) / 0.75),
+}
+
+
+@pytest.mark.parametrize(("fields", "pace"), PROFILES.values(), ids=PROFILES)
+def test_a_velocity_over_the_depth_has_the_stated_mean(load_scene, fields, pace):
+    changes = {f"flow.{name}": value for name, value in fields.items()}
+    scenario = load_scene("case_1", **{"flow.velocity_m_per_s": [10.0, -1.0]} | changes)
+    points, uniform = material_points(scenario), material_points(load_scene("case_1"))
+    mass = points.solid_mass + points.liquid_mass
+    np.testing.assert_allclose(mass @ points.velocity / mass.sum(), [10.0, -1.0], rtol=1e-13)
+    np.testing.assert_allclose(points.velocity[:, 1], -0.1 * points.velocity[:, 0], rtol=1e-13)
+    x, y = points.position.T
+    plateau = (x > -14.9) & (x < -6.1)
+    # The points' middles miss the mean over the depth by that of their rows, below 1 % with thirty.
+    np.testing.assert_allclose(points.velocity[plateau, 0], 10.0 * pace(y[plateau] / 3.0), rtol=0.01)
+    # In the 45° front the depth is that of the column.
+    front = (x > -5.8) & (x < -3.6)
+    np.testing.assert_allclose(points.velocity[front, 0], 10.0 * pace(y[front] / (-3.0 - x[front])), atol=0.7)
+    assert scenario.flow.greatest_speed == pytest.approx(np.hypot(10.0, 1.0) * pace(1.0))
+    assert points.velocity[:, 0].max() <= 10.0 * pace(1.0) * 1.01
+    for name in ("position", "volume", "effective_stress", "pore_pressure"):
+        assert (getattr(points, name) == getattr(uniform, name)).all()
+
+
+def test_what_lies_there_has_no_velocity_over_the_depth(load_scene):
+    deposit = {"shape": {"kind": "polygon", "vertices_m": [[-2, 0], [0, 0], [0, 1], [-2, 1]]}}
+    points = material_points(load_scene("case_1", **{"flow.deposits": [deposit], "flow.base_velocity_share": 0.5}))
+    lying = points.position[:, 0] > -3.0
+    assert lying.any()
+    assert not points.velocity[lying].any()
+    mass = (points.solid_mass + points.liquid_mass)[~lying]
+    assert mass @ points.velocity[~lying, 0] == pytest.approx(10.0 * mass.sum(), rel=1e-13)
+
+
+def test_a_pore_pressure_ratio_may_change_along_the_flow(load_scene):
+    given = [[-18.0, 0.5], [-8.0, 0.5], [-4.0, 1.0]]
+    points = material_points(load_scene("case_1", **{"flow.initial_pore_pressure_ratios": given}))
+    total = points.pore_pressure - points.effective_stress[:, 1]
+    hydrostatic = material_points(load_scene("case_1"))
+    np.testing.assert_allclose(total, hydrostatic.pore_pressure - hydrostatic.effective_stress[:, 1], rtol=1e-12)
+    x = points.position[:, 0]
+    expected = np.clip(0.5 + 0.5 * (x + 8.0) / 4.0, 0.5, 1.0)
+    np.testing.assert_allclose(points.pore_pressure, expected * total, atol=1e-9)
+    assert (x < -18.0).any()  # the tail goes on beyond the table
+    one = material_points(load_scene("case_1", **{"flow.initial_pore_pressure_ratio": 0.7}))
+    flat = material_points(load_scene("case_1", **{"flow.initial_pore_pressure_ratios": [[-9.0, 0.7], [0.0, 0.7]]}))
+    assert (one.pore_pressure == flat.pore_pressure).all()
+
+
+FRONT = {"initial_pore_pressure_ratios": [[-9, 0.5], [0, 1]]}
+
+NO_START = {
+    "beyond 1": (
+        {"initial_pore_pressure_ratios": [[-9, 0.5], [-3, 1.2]]},
+        r"ratios\[1\] has the ratio 1.2; it must be from 0 to 1",
+    ),
+    "back along x": (
+        {"initial_pore_pressure_ratios": [[-9, 0.5], [-9, 1]]},
+        r"ratios\[1\] is at x = -9, after -9; x must increase",
+    ),
+    "one place": ({"initial_pore_pressure_ratios": [[-9, 0.5]]}, "pressure_ratios = .* a list of 2 to 2000 pairs"),
+    "two ways": (FRONT | {"initial_pore_pressure_ratio": 0.5}, "at most one of initial_pore_pressure_ratio and"),
+    "no weight": (FRONT | {"initial_stress": "zero"}, 'ratios is not allowed with flow.initial_stress = "zero"'),
+    "heights": (
+        {"velocity_profile": [[0, 0], [0.5, 1], [2, 1]]},
+        "velocity_profile has the heights 0, 0.5, 2; they must increase from 0 to 1",
+    ),
+    "backward": (
+        {"velocity_profile": [[0, -0.5], [1, 1]]},
+        r"velocity_profile\[0\] has the velocity -0.5; velocities must be at least 0",
+    ),
+    "nowhere": ({"velocity_profile": [[0, 0], [1, 0]]}, "velocity 0; velocities must be at least 0, and not all 0"),
+    "both": (
+        {"velocity_profile": [[0, 0], [1, 1]], "velocity_exponent": 2.0},
+        "velocity_profile is not allowed with base_velocity_share or",
+    ),
+    "share": ({"base_velocity_share": 1.5}, "base_velocity_share = 1.5 is not allowed; .* at least 0 and at most 1"),
+}
+
+
+@pytest.mark.parametrize(("changes", "words"), NO_START.values(), ids=NO_START)
+def test_what_is_no_start_gets_one_sentence(load_scene, changes, words):
+    with pytest.raises(ScenarioError, match=words) as refused:
+        load_scene("case_1", **{f"flow.{name}": value for name, value in changes.items()})
+    assert len(refused.value.problems) == 1

@@ -121,6 +121,10 @@ WRONG = {
     "width": ({"width_m": 3.0}, "width_m = 3 is of a discharge"),
     "beyond the barrier": ({"x_m": 1.0}, "x_m = 1 does not lie upstream of the barrier at x = 0; it must be less"),
     "below the ground": ({"base_m": -1.0}, "base_m = -1 lies below the ground"),
+    "stands at the bed": (
+        {"velocity_profile": [[0, 0], [1, 1]]},
+        r"velocity_profile\[0\] has 0 of the mean velocity; of what arrives it must be at least 0.1",
+    ),
     "file and table": ({"hydrograph_csv": "a.csv"}, "hydrograph_csv is not allowed with times_s and depths_m and"),
 }  # fmt: skip
 
@@ -152,6 +156,7 @@ def test_what_is_no_inflow_gets_one_sentence(change, sentence):
             "does not lie upstream of the barrier, which is driven to x = -18; it must be less",
         ),
         ({"flow.velocity_m_per_s": [1.0, 0.0]}, "is that of a shape, which is not given"),
+        ({"flow.base_velocity_share": 0.5}, "a velocity that varies over the depth is that of a shape, which is not"),
         ({"flow.inflow": None}, "shape is missing; it must be given, unless there is an inflow"),
     ],
 )  # fmt: skip
@@ -205,6 +210,24 @@ def test_points_hold_the_volume_of_the_table_and_come_in_order(share):
         assert passed == pytest.approx(inflow.volume_until(moment), abs=0.1 * 2.0 / share)
     discharge = (points.volume * points.pace).sum() / points.volume.sum()
     assert discharge == pytest.approx(1.0, abs=1e-12) if share == 1.0 else discharge > 1.02
+
+
+def test_points_arrive_by_a_table_over_the_depth_as_by_the_law_that_it_tells():
+    linear = arriving_points(Inflow(x_m=-5.0, **HUMP, base_velocity_share=0.5), 0.2, 4)
+    table = arriving_points(Inflow(x_m=-5.0, **HUMP, velocity_profile=[[0, 2], [1, 6]]), 0.2, 4)
+    for name in ("position", "volume", "pace", "entry"):
+        np.testing.assert_allclose(getattr(table, name), getattr(linear, name), rtol=1e-12, atol=1e-12)
+    # A jet below the surface: the greatest pace is that of no end.
+    jet = Inflow(x_m=-5.0, **HUMP, velocity_profile=[[0, 1], [0.5, 4], [1, 2]])
+    assert jet.greatest_speed == pytest.approx(8.0 * 4.0 / 2.75)
+    assert arriving_points(jet, 0.2, 4).volume.sum() == pytest.approx(jet.volume, rel=1e-12)
+
+
+def test_what_arrives_has_the_flow_s_pore_pressure_ratio_of_the_section():
+    changes = {"flow.initial_pore_pressure_ratios": [[-15.0, 0.6], [-5.0, 1.0]]}
+    points = material_points(scene({"x_m": -10.0} | HUMP, **changes))
+    total = points.pore_pressure - points.effective_stress[:, 1]
+    np.testing.assert_allclose(points.pore_pressure, 0.8 * total, rtol=1e-12, atol=1e-9)
 
 
 def test_points_that_arrive_begin_with_the_stress_of_their_depth():

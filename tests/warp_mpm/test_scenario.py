@@ -191,7 +191,7 @@ def test_table_4(name):
         (
             "flow.velocity_m_per_s",
             [1],
-            "flow.velocity_m_per_s = [1] is not allowed; it must be a list of 2 numbers: uniform velocity [x, y]",
+            "flow.velocity_m_per_s = [1] is not allowed; it must be a list of 2 numbers: velocity [x, y]",
         ),
         ("flow.material.dilatancy_angle_deg", 30, "dilatancy_angle_deg = 30 must not exceed friction_angle_deg = 20"),
         ("flow.material.intrinsic_permeability_m2", 1e-11, "exactly one of hydraulic_conductivity_m_per_s"),

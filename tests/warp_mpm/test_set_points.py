@@ -84,3 +84,23 @@ def test_a_run_that_has_begun_is_not_changed():
     simulation.advance(1e-3)
     with pytest.raises(ValueError, match="has made steps already"):
         simulation.set_points(solid_velocity=np.zeros((64, 2)))
+
+
+@pytest.mark.parametrize("transfer", ["aflip", pytest.param("flip", marks=pytest.mark.slow)])
+def test_a_velocity_over_the_depth_is_that_which_could_be_set(load_scene, transfer):
+    """The scheme's own fields and the first step are those of the velocities too, and all momentum is counted."""
+    changes = {"numerics.spacing_m": 0.5, "numerics.transfer": transfer}
+    given = Simulation(load_scene("case_1", **changes | {"flow.velocity_profile": [[0, 0], [0.1, 0], [1, 2]]}))
+    points = given.points()
+    fastest = given.scenario.flow.greatest_speed  # the scheme's damping goes by it
+    by_hand = Simulation(load_scene("case_1", **changes | {"flow.velocity_m_per_s": [fastest, 0.0]}))
+    by_hand.set_points(solid_velocity=points["solid_velocity"], liquid_velocity=points["liquid_velocity"])
+    for simulation in (given, by_hand):
+        simulation.advance(0.05)
+    assert given.sample()["momentum_x"] > 0.0
+    # What lies still at the start weighs as much as what moves.
+    assert abs(given.sample()["momentum_residual_x"]) < 1e-9 * given.sample()["momentum_x"]
+    for name, values in given.points().items():
+        np.testing.assert_allclose(
+            values, by_hand.points()[name], rtol=1e-9, atol=1e-9 * np.abs(values).max(), err_msg=name
+        )

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import analytic.cli
 from warp_mpm.cli import app
-from warp_mpm.description import described_material
+from warp_mpm.description import described, described_material
 from warp_mpm.slips import slips
 
 SLIDING = {"kind": "sliding", "base_friction": 0.29}
@@ -132,6 +132,11 @@ def test_the_card_has_what_an_engineer_asks_for(load_scene):
         "bulk density 1,800 kg/m³, n = 0.5, φ' = 20°, k = 0.0001 m/s, E = 2 MPa, K0 = 0.66 (given); "
         "L = 15 m, of the box of its volume and depth"
     )
+    started = load_scene(
+        "case_1", **{"flow.initial_pore_pressure_ratios": [[-9, 0.6], [-3, 1]], "flow.base_velocity_share": 0.5}
+    )
+    assert "λ_p = 0.6 to 1" in described_material(started)
+    assert "v = 10 m/s (Fr 1.84), from 0.5 to 1.5 of it over the depth;" in described(started)[0]
     dry = described_material(load_scene("case_1_dry", **{"flow.lateral_stress_coefficient": None}))
     assert "k = " not in dry
     assert "K0 = 0.658 (by the law mohr_coulomb)" in dry

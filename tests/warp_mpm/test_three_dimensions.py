@@ -477,6 +477,7 @@ MUD = {"law": "herschel_bulkley", "yield_stress_Pa": 300.0, "consistency_Pa_s": 
             {"barrier": None, "ground": {"profile_m": [[-30.0, 0.0], [0.0, 0.0], [20.0, -1.0]]}},
             "a ground that is not level",
         ),
+        ("case_1_dry", {"barrier": None, "flow.base_velocity_share": 0.5}, "a velocity that varies over the depth"),
     ],
 )
 def test_what_is_not_there_in_space_is_refused(load_scene, name, changes, told):

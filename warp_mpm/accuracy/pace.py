@@ -142,7 +142,7 @@ def points_of(scenario: Scenario) -> float:
 
 def steps_and_points(scenario: Scenario) -> float:
     """Number of steps times number of points, told without running anything; the flow gets no slower than it begins."""
-    return predicted_steps(scenario, (Ahead(0.0, scenario.flow.speed, 1.0),)) * points_of(scenario)
+    return predicted_steps(scenario, (Ahead(0.0, scenario.flow.greatest_speed, 1.0),)) * points_of(scenario)
 
 
 def pace_of(runs: Sequence[tuple[Scenario, Result]], timed: tuple[Scenario, float, float] | None = None) -> Pace:

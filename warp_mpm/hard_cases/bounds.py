@@ -25,8 +25,8 @@ def impact_speed(scenario: Scenario) -> float:
         lowest = lowest_ground(scenario, *_between(scenario))
     height = outline[:, 1].max() - (lowest if lowest is not None else outline[:, 1].min())
     time = scenario.output.end_time_s
-    downhill = abs(gx) * (scenario.flow.speed * time + 0.5 * abs(gx) * time**2)
-    speed = math.sqrt(scenario.flow.speed**2 + 2.0 * (abs(gy) * height + downhill))
+    downhill = abs(gx) * (scenario.flow.greatest_speed * time + 0.5 * abs(gx) * time**2)
+    speed = math.sqrt(scenario.flow.greatest_speed**2 + 2.0 * (abs(gy) * height + downhill))
     driven = [barrier.motion for _, _, barrier in scenario.all_barriers if isinstance(barrier.motion, Prescribed)]
     speed += max((abs(velocity) for motion in driven for velocity in motion.velocities_m_per_s), default=0.0)
     return speed

@@ -133,7 +133,7 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
         material_points=simulation.material_points,
         cells=(simulation.grid.columns, simulation.grid.rows),
         blocks_in_use=blocks,
-        wave_step=scenario.numerics.spacing_m / (step_limits(scenario).wave_speed + scenario.flow.speed),
+        wave_step=scenario.numerics.spacing_m / (step_limits(scenario).wave_speed + scenario.flow.greatest_speed),
         drag_step=step_limits(scenario).drag_step,
         law_step=step_limits(scenario).law_step,
         steps=predicted_steps(scenario, ahead),
@@ -199,7 +199,7 @@ def run_ahead(scenario: Scenario, *, device: str = "cpu") -> list[Ahead]:
     twin.advance(1e-6 * end_time)
     ahead: list[Ahead] = []
     begin = clock()
-    before = [twin.time, flow.speed, twin.steps, begin]
+    before = [twin.time, flow.greatest_speed, twin.steps, begin]
 
     def look(twin: Simulation) -> None:
         time, speed, steps, now = before

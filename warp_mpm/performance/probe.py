@@ -45,7 +45,7 @@ class Stepper:
         self.furthest = 0.0
         """Greatest simulated time that was reached [s]."""
         limits, numerics = step_limits(scenario), scenario.numerics
-        wave = numerics.spacing_m / (limits.wave_speed + scenario.flow.speed)
+        wave = numerics.spacing_m / (limits.wave_speed + scenario.flow.greatest_speed)
         self._step = numerics.courant_number * min(wave, limits.largest_step)
         self._per_step = self._cost(2)[0] / 2.0
 

@@ -64,16 +64,13 @@ def problems(scenario: Scenario) -> list[str]:
             'must be "constant", or the drag "semi_implicit"'
         )
     flow = scenario.flow
-    if flow.initial_pore_pressure_ratio is not None and flow.initial_stress == "zero":
-        found.append(
-            f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g} is not allowed with "
-            'flow.initial_stress = "zero"; it must be null'
-        )
-    if flow.initial_pore_pressure_ratio is not None and flow.formulation == "dry":
-        found.append(
-            f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g} is not allowed in a dry flow, "
-            "which has no liquid; it must be null"
-        )
+    given = "flow.initial_pore_pressure_ratios"
+    if flow.initial_pore_pressure_ratio is not None:
+        given = f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g}"
+    if flow.pore_pressure_ratio_range is not None and flow.initial_stress == "zero":
+        found.append(f'{given} is not allowed with flow.initial_stress = "zero"; it must be null')
+    if flow.pore_pressure_ratio_range is not None and flow.formulation == "dry":
+        found.append(f"{given} is not allowed in a dry flow, which has no liquid; it must be null")
     return found
 
 

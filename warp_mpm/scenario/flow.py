@@ -10,12 +10,14 @@ from functools import cache
 from typing import Annotated, Any, Literal, Self, Union
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
 from warp_mpm.scenario.ground import Ground
 from warp_mpm.scenario.inflow import Inflow
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
+from warp_mpm.scenario.velocity_profile import VelocityProfile
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.schema import (
     AsWhole,
@@ -329,11 +331,11 @@ class TwoPhaseMaterial(UndrainedMaterial):
         return self.hydraulic_conductivity * self.liquid_viscosity_Pa_s / weight
 
 
-class _FlowBase(Model):
+class _FlowBase(VelocityProfile):
     shape: Annotated[FrontAndTail | FlowPolygon | FlowOnGround, Field(discriminator="kind")] | None = None
     """Outline at t = 0; null of a flow that only arrives (`inflow`)."""
     velocity_m_per_s: Annotated[tuple[Velocity, Velocity], Field(strict=False)] = (0.0, 0.0)
-    """Uniform velocity [x, y] at t = 0, of both phases; it must be given with a shape."""
+    """Velocity [x, y] at t = 0, of both phases, meant over the depth; it must be given with a shape."""
     inflow: Inflow | None = None
     """What arrives at a section during the run; null: nothing does."""
     deposits: Annotated[tuple[Deposit, ...], Field(strict=False, max_length=100)] = ()
@@ -346,6 +348,10 @@ class _FlowBase(Model):
     initial_pore_pressure_ratio: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
     """λ_p, pore pressure over total vertical stress at t = 0, of a geostatic start with a liquid: 1 where the flow is
     liquefied; null: hydrostatic."""
+    initial_pore_pressure_ratios: (
+        Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=2000)] | None
+    ) = None
+    """The same along the flow, [x, λ_p], x increasing: linear between, as the last beyond. null: one ratio for all."""
 
     material: Skeleton
 
@@ -367,7 +373,43 @@ class _FlowBase(Model):
                 f"velocity_m_per_s = {list(self.velocity_m_per_s)} is that of a shape, which is not given; the "
                 "velocities of what arrives stand in inflow"
             )
+        if self.shape is None and (self.sheared or self.velocity_exponent != 1.0):
+            raise ValueError(
+                "a velocity that varies over the depth is that of a shape, which is not given; that of what arrives "
+                "stands in inflow"
+            )
         return self
+
+    @model_validator(mode="after")
+    def _ratios(self) -> Self:
+        if self.initial_pore_pressure_ratios is None:
+            return self
+        if self.initial_pore_pressure_ratio is not None:
+            raise ValueError("needs at most one of initial_pore_pressure_ratio and initial_pore_pressure_ratios")
+        before = -math.inf
+        for place, (x, ratio) in enumerate(self.initial_pore_pressure_ratios):
+            name = f"initial_pore_pressure_ratios[{place}]"
+            if not 0.0 <= ratio <= 1.0:
+                raise ValueError(f"{name} has the ratio {ratio:g}; it must be from 0 to 1")
+            if not x > before:
+                raise ValueError(f"{name} is at x = {x:g}, after {before:g}; x must increase")
+            before = x
+        return self
+
+    def pore_pressure_ratio(self, x: NDArray[np.float64]) -> float | NDArray[np.float64] | None:
+        """λ_p at t = 0 at places x [N] [m], one for all or [N]; None: hydrostatic."""
+        if self.initial_pore_pressure_ratios is None:
+            return self.initial_pore_pressure_ratio
+        return np.interp(x, *np.array(self.initial_pore_pressure_ratios).T)
+
+    @property
+    def pore_pressure_ratio_range(self) -> tuple[float, float] | None:
+        """Least and greatest λ_p at t = 0 that is given; None: hydrostatic."""
+        if self.initial_pore_pressure_ratios is not None:
+            ratios = [ratio for _, ratio in self.initial_pore_pressure_ratios]
+            return min(ratios), max(ratios)
+        ratio = self.initial_pore_pressure_ratio
+        return None if ratio is None else (ratio, ratio)
 
     def laid_on(self, ground: Ground) -> Self:
         """The same flow over `ground`: what lies on it as a polygon, and the section of what arrives at its height."""
@@ -465,9 +507,14 @@ class _FlowBase(Model):
 
     @property
     def speed(self) -> float:
-        """Magnitude of the initial velocity [m/s], or of the greatest that arrives."""
+        """Magnitude of the initial velocity [m/s], meant over the depth, or of the greatest that arrives."""
         speed = math.hypot(*self.velocity_m_per_s)
         return max(speed, self.inflow.greatest_speed) if self.inflow is not None else speed
+
+    @property
+    def greatest_speed(self) -> float:
+        """Magnitude of the greatest velocity at any height, initial or of what arrives [m/s]."""
+        return max(self.speed, math.hypot(*self.velocity_m_per_s) * self.greatest_pace)
 
 
 class TwoPhaseFlow(_FlowBase):

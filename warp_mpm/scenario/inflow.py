@@ -15,13 +15,17 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from warp_mpm.scenario.ground import Ground
-from warp_mpm.schema import Coordinate, Length, Model, Series, Text
+from warp_mpm.scenario.velocity_profile import VelocityProfile
+from warp_mpm.schema import Coordinate, Length, Series, Text
 
 Array = NDArray[np.float64]
 
 APPROACH = 4
 """Cells upstream of the section in which what arrives is held at its depth and velocity, so that the section sees a
 full neighbourhood: a point's nodes reach 1.5 cells, and the points of these nodes as far again."""
+
+LEAST_PACE = 0.1
+"""Least velocity of what arrives over the mean over its depth: what stands still at the section never comes."""
 
 PIECES = 32
 """Straight pieces for the curved way of an interval in which the velocity changes."""
@@ -39,7 +43,7 @@ COLUMNS = {
 """Names of the columns of a hydrograph, in small letters, without their unit in brackets, and _ for a space."""
 
 
-class Inflow(Model):
+class Inflow(VelocityProfile):
     """A flow that arrives at an upright section, in one surge or several.
 
     Between the given times depth and velocity are linear; before the first and after the last nothing arrives, nor
@@ -65,10 +69,8 @@ class Inflow(Model):
     """File with the table, beside the scenario, in place of times_s and what belongs to them."""
     width_m: Length | None = None
     """Width of the channel by which a discharge in the file is divided; null: it is per metre of width."""
-    base_velocity_share: Annotated[float, Field(ge=0.1, le=1.0)] = 1.0
+    base_velocity_share: Annotated[float, Field(ge=LEAST_PACE, le=1.0)] = 1.0
     """Velocity at the flow's underside over the mean over the depth; 1: the same at all heights."""
-    velocity_exponent: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """m of the velocity s + (1 - s)(1 + m)(y / h)^m over the mean, with that share s at the underside; 1: linear."""
 
     _bed: tuple[float, float] = (0.0, 0.0)
 
@@ -117,6 +119,13 @@ class Inflow(Model):
             raise ValueError(f"times_s[0] = {self.times_s[0]:g} is not allowed; it must be at least 0")
         if not self.volume > 0.0:
             raise ValueError("brings nothing: depth or velocity is 0 at all times")
+        if self.velocity_profile is not None:
+            paces = self.paces(np.array(self.velocity_profile)[:, 0])
+            if paces.min() < LEAST_PACE * (1.0 - 1e-9):
+                raise ValueError(
+                    f"velocity_profile[{int(np.argmin(paces))}] has {paces.min():.3g} of the mean velocity; of what "
+                    f"arrives it must be at least {LEAST_PACE:g}"
+                )
         return self
 
     # -- the section -----------------------------------------------------------------------------------------------
@@ -248,12 +257,7 @@ class Inflow(Model):
     @property
     def greatest_speed(self) -> float:
         """Of any height, along the ground [m/s]."""
-        return float(self.velocities.max()) * float(self.paces(np.array([1.0]))[0]) * math.hypot(1.0, self.slope)
-
-    def paces(self, height: Array) -> Array:
-        """Velocity over its mean over the depth, at heights [N] over the depth."""
-        s, m = self.base_velocity_share, self.velocity_exponent
-        return s + (1.0 - s) * (1.0 + m) * height**m
+        return float(self.velocities.max()) * self.greatest_pace * math.hypot(1.0, self.slope)
 
 
 def surges_of(inflow: Inflow) -> list[tuple[float, float]]:

@@ -119,7 +119,7 @@ def clock_arrays(
     `kernels.layout`."""
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.SMALLEST_TIME_STEP] = math.inf
-    clock[at.SPEED_MAX] = scenario.flow.speed**2
+    clock[at.SPEED_MAX] = scenario.flow.greatest_speed**2
     there = slice(None, initial.there)
     solid, liquid = float(initial.solid_mass[there].sum()), float(initial.liquid_mass[there].sum())
     if not effects.two_phase:

@@ -87,7 +87,7 @@ def _grid_and_clock(
         "largest_stable_step": limits.largest_step,
         "largest_stable_step_counter": at.LIMIT_LAW if limits.law_step < limits.drag_step else at.LIMIT_DRAG,
         **({"front": grid.front, "layers": grid.layers, "layer": grid.columns * grid.rows} if grid.layers > 1 else {}),
-    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.speed)
+    } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.greatest_speed)
 
 
 def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits, material: Skeleton) -> dict[str, Any]:

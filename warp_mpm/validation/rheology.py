@@ -18,6 +18,7 @@ from warp_mpm.results import Results
 from warp_mpm.run import run_scenario
 from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.bodies import Body, Driven, Outline, Surface
 from warp_mpm.validation.case import (
     Array,
     Case,
@@ -168,6 +169,125 @@ def film(quick: bool) -> Outcome:
         )
     )
     return Outcome(checks=checks, panels=panels)
+
+
+# -- plane Couette flow ------------------------------------------------------------------------------------------------
+
+COUETTE: dict[str, dict[str, Any]] = {
+    "Bingham": {"yield_stress_Pa": 1500.0, "consistency_Pa_s": 18000.0},
+    "Herschel–Bulkley, m = 0.5": {"yield_stress_Pa": 1500.0, "consistency_Pa_s": 8000.0, "flow_exponent": 0.5},
+}
+"""So viscous that half a second is ten times what they take to come to their profile, elastic swing included."""
+
+PLATE_SPEED, PRESSED = 0.2, 5000.0
+"""Of the upper plane [m/s]; pressure with which the layer is held between both, ten times what no slip needs [Pa]."""
+
+
+def couette(quick: bool) -> Outcome:
+    """A layer of 1 m, without weight, between the ground and a plate that moves along it, neither of which it slips on.
+
+    The limits, set before the first run: the layer knows of a plane by its outermost points, a quarter of a cell from
+    it, so that either may act as if it lay that far off. The velocity may then be wrong by a quarter of a cell's
+    share of the plate's, and the viscous part of the stress by half of a cell over the depth. On the plate, whose
+    force is that of all of the layer, up to a depth at either end bears less. (What came is a hundredth of that: the
+    planes hold where they are, and a linear profile is one that the splines have. Single points scatter by 0.3 % of the
+    viscous stress at any spacing, so that convergence, first asked of their largest error, is asked of the mean.)
+    """
+    ladder = (4, 8) if quick else (5, 10, 20)
+    length, end = 60.0, 0.5
+    checks: list[Check] = []
+    panels: list[Panel] = []
+    for name, mud in COUETTE.items():
+        viscous = mud["consistency_Pa_s"] * PLATE_SPEED ** mud.get("flow_exponent", 1.0)
+        exact = mud["yield_stress_Pa"] + viscous
+        curves = [reference([0.0, PLATE_SPEED], [0.0, 1.0], "u = V y/h")]
+        speed_errors, stress_errors, mean_errors = [], [], []
+        for cells in ladder:
+            y, speed, stress, force = between_planes(mud, cells, length, end)
+            speed_errors.append(float(np.abs(speed - PLATE_SPEED * y).max()) / PLATE_SPEED)
+            stress_errors.append(float(np.abs(stress - exact).max()) / viscous)
+            mean_errors.append(abs(float(stress.mean()) - exact) / viscous)
+            order = np.argsort(y)
+            curves.append(Curve(speed[order], y[order], f"{cells} cells deep", "."))
+        checks += [
+            at_most(
+                f"{name}, {cells} cells: profile, largest error",
+                "of the plate's speed",
+                speed_errors[-1],
+                0.25 / cells,
+                percent=True,
+            ),
+            compared(
+                f"{name}, {cells} cells: shear stress, mean",
+                "Pa",
+                float(stress.mean()),
+                exact,
+                0.5 / cells,
+                scale=viscous,
+            ),
+            at_most(
+                f"{name}, {cells} cells: shear stress, largest error",
+                "of its viscous part",
+                stress_errors[-1],
+                0.5 / cells,
+                percent=True,
+            ),
+            compared(
+                f"{name}, {cells} cells: force on the plate over its length",
+                "Pa",
+                force / length,
+                exact,
+                0.5 / cells + 2.0 / length,
+            ),
+        ]
+        for what, errors in (("profile", speed_errors), ("mean shear stress", mean_errors)):
+            checks.append(
+                holds(
+                    f"{name}: the error of the {what} falls with the spacing, or all that is left is below 0.2 %",
+                    "-",
+                    errors[-1] / errors[0],
+                    errors[-1] < 0.7 * errors[0] or errors[-1] < 0.002,
+                    reference="< 0.7; errors " + ", ".join(f"{100 * error:.2g} %" for error in errors),
+                )
+            )
+        panels.append(Panel(name, "speed [m/s]", "height [m]", curves))
+    return Outcome(checks=checks, panels=panels)
+
+
+def between_planes(mud: dict[str, Any], cells: int, length: float, end: float) -> tuple[Array, Array, Array, float]:
+    """Heights [N] [m], speeds [N] [m/s] and shear stresses [N] [Pa] in the middle of a layer at its end, and the force
+    on the plate [N/m], mean over the last tenth."""
+    spacing = 1.0 / cells
+    base = scene(
+        "layer between planes",
+        box(-length, 0.0, 1.0),
+        "dry",
+        end_time=end,
+        gravity=0.0,
+        ground=NO_SLIP,
+        stress="zero",
+        soil=MIXTURE | {"law": "herschel_bulkley"} | mud,
+        spacing_m=spacing,
+        domain={"left_m": -length - 4.0, "right_m": 4.0, "top_m": 2.0},
+    )
+    plate = Body(
+        "plate",
+        Outline([(-length - 2.0, 1.0), (2.0, 1.0), (2.0, 1.5), (-length - 2.0, 1.5)]),
+        (Surface("plate", NO_SLIP),),
+        Driven((0.0,), ((PLATE_SPEED, 0.0),)),
+    )
+    simulation = Simulation(base, bodies=[plate])
+    pressed = np.zeros((simulation.material_points, 4))
+    pressed[:, :3] = -PRESSED
+    simulation.set_points(effective_stress=pressed)
+    simulation.advance(0.9 * end)
+    since = simulation.window()
+    simulation.advance(end)
+    force = simulation.sample(since=since)["plate_force_x"]
+    points = simulation.points()
+    x, y = points["position"].T
+    middle = np.abs(x + 0.5 * length) < 1.0
+    return y[middle], points["solid_velocity"][middle, 0], points["effective_stress"][middle, 3], -float(force)
 
 
 # -- a heap of Bingham fluid ---------------------------------------------------------------------------------------
@@ -361,7 +481,14 @@ def bagnold(quick: bool) -> Outcome:
 
 
 def pressure_on_a_slope(quick: bool) -> Outcome:
-    """A block that slides on its base, its pore pressure a share of its weight."""
+    """A block that slides on its base, its pore pressure a share of its weight: everywhere the same, or growing from
+    tail to front.
+
+    In the second each place is as fast as its own share lets it until waves from the ends come, if the total stress
+    along the block is the same all over (K0 = 1). The block is stretched by the difference, evenly, so that nothing
+    pulls; its pore pressure falls by what the stretch takes, 0.3 kPa at the
+    end of the 0.1 s, on the mean 0.6 % of its base friction.
+    """
     spacings = (0.1, 0.05) if quick else (0.1, 0.05, 0.025)
     ratios = (0.0, 1.0) if quick else (0.0, 0.3, 0.6, 0.9, 1.0)
     sine, cosine = math.sin(math.radians(SLIDE)), math.cos(math.radians(SLIDE))
@@ -370,13 +497,29 @@ def pressure_on_a_slope(quick: bool) -> Outcome:
     curves = [reference(fine, G * (sine - (1.0 - fine) * SLIDE_FRICTION * cosine), "g (sin θ − (1 − λ_p) tan φ cos θ)")]
     errors = []
     for spacing in spacings:
-        found = np.array([sliding_block(ratio, spacing) for ratio in ratios])
+        found = np.array([sliding_block(ratio, spacing)[0] for ratio in ratios])
         exact = G * (sine - (1.0 - np.array(ratios)) * SLIDE_FRICTION * cosine)
         errors.append(float(np.abs(found - exact).max()))
         curves.append(Curve(ratios, found, f"{spacing:g} m", "o"))
     checks += [
         compared(f"λ_p = {ratio:g}, {spacings[-1]:g} m: acceleration", "m/s²", ours, right, 0.02, scale=G * sine)
         for ratio, ours, right in zip(ratios, found, exact, strict=True)
+    ]
+    along = np.array(RISING)
+    places = (-19.0, -13.0, -7.0)
+    shares = np.interp(places, *along.T)
+    there = sliding_block(RISING, spacings[-1], places=places, end=0.1)
+    curves.append(Curve(shares, there, f"places of one block, {spacings[-1]:g} m", "x"))
+    checks += [
+        compared(
+            f"λ_p along the block, {spacings[-1]:g} m: acceleration where it is {share:.3g}",
+            "m/s²",
+            ours,
+            G * (sine - (1.0 - share) * SLIDE_FRICTION * cosine),
+            0.02,
+            scale=G * sine,
+        )
+        for share, ours in zip(shares, there, strict=True)
     ]
     checks.append(
         holds(
@@ -391,12 +534,20 @@ def pressure_on_a_slope(quick: bool) -> Outcome:
 
 
 SLIDE, SLIDE_FRICTION = 25.0, math.tan(math.radians(20.0))
+RISING = ((-26.0, 0.2), (0.0, 1.0))
+"""λ_p from the block's tail to its front."""
 
 
-def sliding_block(ratio: float, spacing: float) -> float:
-    """Acceleration [m/s²] of the middle of a block with λ_p = `ratio` at the start, from t = 0 to 0.2 s, in which no
-    wave from an end, 49 m/s fast, comes there."""
-    end, cosine = 0.2, math.cos(math.radians(SLIDE))
+def sliding_block(
+    ratio: float | tuple[tuple[float, float], ...],
+    spacing: float,
+    *,
+    places: Sequence[float] = (-13.0,),
+    end: float = 0.2,
+) -> list[float]:
+    """Acceleration [m/s²] of a block around `places` x [m], from t = 0 to the `end` [s], until which no wave from one
+    of its ends, 49 m/s fast, may come there; λ_p at the start is `ratio`, or a table of it along x."""
+    cosine = math.cos(math.radians(SLIDE))
     base = scene(
         "block on a slope",
         box(-26.0, 0.0, 1.0),
@@ -405,6 +556,7 @@ def sliding_block(ratio: float, spacing: float) -> float:
         velocity=(1.0, 0.0),
         tilt=SLIDE,
         ground=SLIDE_FRICTION,
+        lateral=None if isinstance(ratio, float) else 1.0,
         spacing_m=spacing,
         # Stronger than its base, so that it moves as a block, and both phases bear the tension of their noise.
         soil={
@@ -416,19 +568,23 @@ def sliding_block(ratio: float, spacing: float) -> float:
         },
         domain={"left_m": -27.0, "right_m": 10.0, "top_m": 2.0},
     )
-    simulation = Simulation(base.replaced({"flow.initial_pore_pressure_ratio": ratio}))
+    field = "flow.initial_pore_pressure_ratio" if isinstance(ratio, float) else "flow.initial_pore_pressure_ratios"
+    simulation = Simulation(base.replaced({field: ratio}))
     points = simulation.points()
     x, y = points["position"].T
-    middle = np.abs(x + 13.0) < 1.0
+    share = simulation.scenario.flow.pore_pressure_ratio(x)
+    assert share is not None
+    parts = [np.abs(x - place) < 1.0 for place in places]
     # It slides from the start, so that the shear of its base is there from the start as well.
     stress = points["effective_stress"].copy()
-    stress[:, 3] = (1.0 - ratio) * SLIDE_FRICTION * base.flow.material.density * G * cosine * (1.0 - y)
+    stress[:, 3] = (1.0 - share) * SLIDE_FRICTION * base.flow.material.density * G * cosine * (1.0 - y)
     simulation.set_points(effective_stress=stress)
-    speed, times = [1.0], np.linspace(0.0, end, 21)
+    speeds, times = [[1.0] * len(parts)], np.linspace(0.0, end, 21)
     for time in times[1:]:
         simulation.advance(float(time))
-        speed.append(float(simulation.points()["solid_velocity"][middle, 0].mean()))
-    return float(np.polyfit(times, speed, 1)[0])
+        along = simulation.points()["solid_velocity"][:, 0]
+        speeds.append([float(along[part].mean()) for part in parts])
+    return [float(np.polyfit(times, speed, 1)[0]) for speed in zip(*speeds, strict=True)]
 
 
 # -- a block on Voellmy's ground -------------------------------------------------------------------------------------
@@ -492,6 +648,11 @@ def voellmy(quick: bool) -> Outcome:
 VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "mohr_coulomb, φ' = 20°": ("case_1", {}),
     "the same, liquefied at the start": ("case_1", {"flow.initial_pore_pressure_ratio": 1.0}),
+    "the same, liquefied at the front": (
+        "case_1",
+        {"flow.initial_pore_pressure_ratios": [[-15.0, 1.0 / 1.8], [-6.0, 1.0]]},  # hydrostatic behind
+    ),
+    "the same, linear velocity from 0 at the bed": ("case_1", {"flow.base_velocity_share": 0.0}),
     "the same, inertial drag (Ergun)": ("case_1", {"flow.material.inertial_drag_coefficient": 0.404}),
     "the same, loose: solid fraction 0.50 of 0.56": ("case_1_loose", {}),
     "the same, dense: 0.50 of 0.44": (
@@ -599,6 +760,16 @@ CASES = (
         run=film,
     ),
     Case(
+        name="couette",
+        title="Plane Couette flow",
+        tests="A layer of 1 m of Bingham's and of Herschel and Bulkley's fluid, 60 m long and without weight, between "
+        "the ground and a plate that is driven along it at 0.2 m/s, from rest; its middle after 0.5 s.",
+        source="u = V y/h, τ = τ_y + K (V/h)^m",
+        limit="profile a quarter of a cell over the depth, stress half of one of its viscous part, force on the plate "
+        "2 m of its length besides; the error falls with the spacing, or 0.2 % is left",
+        run=couette,
+    ),
+    Case(
         name="heap",
         title="Heap of Bingham fluid",
         tests="A block of 1.25 m by 0.8 m beside a smooth wall (half of a heap) is let go on a rough bed and comes to "
@@ -630,8 +801,9 @@ CASES = (
         name="pressure-on-a-slope",
         title="Excess pore pressure on a slope",
         tests="An undrained block, 26 m by 1 m, slides at 1 m/s down a slope of 25° on a base of tan 20°, with a pore "
-        "pressure of λ_p times its weight at the start; acceleration of its middle. The contact knows the pressure at "
-        "its base to the weight of half a cell of liquid.",
+        "pressure of λ_p times its weight at the start; acceleration of its middle, and of three places of a block "
+        "whose λ_p grows from 0.2 at its tail to 1 at its front. The contact knows the pressure at its base to the "
+        "weight of half a cell of liquid.",
         source="a = g (sin θ − (1 − λ_p) tan φ cos θ)",
         limit="2 % of g sin θ; the error falls with the spacing",
         run=pressure_on_a_slope,

@@ -199,7 +199,7 @@ def _along(scenario: Scenario, pieces: Segments, own: Sequence[int]) -> tuple[Ar
         return starts, 0.0, max(float(shown.sum()), 1e-9)
     y, g = np.concatenate(flow.outlines)[:, 1], -scenario.gravity.vector[1]
     low, high = y.min(), y.max()
-    motion, speed = scenario.barrier.motion, flow.speed
+    motion, speed = scenario.barrier.motion, flow.greatest_speed
     if isinstance(motion, Prescribed):
         speed += max(abs(velocity) for velocity in motion.velocities_m_per_s)
     reach = flow.depth + (speed**2 / g if g > 0.0 else 10.0 * flow.depth)
