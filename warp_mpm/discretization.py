@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,15 @@ Array = NDArray[np.float64]
 
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
+
+
+class Stretch(NamedTuple):
+    """Points of one material that follow each other, from `begin` to before `end`."""
+
+    material: int
+    """Place among the flow's materials."""
+    begin: int
+    end: int
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,12 @@ class MaterialPoints:
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
     material: NDArray[np.int32]
     """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
+
+    @property
+    def stretches(self) -> list[Stretch]:
+        """Parts of one material each, in their order, that are as long as can be."""
+        ends = [*(np.flatnonzero(np.diff(self.material)) + 1).tolist(), len(self.material)]
+        return [Stretch(int(self.material[begin]), begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
 
     @property
     def there(self) -> int:

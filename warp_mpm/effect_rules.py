@@ -99,11 +99,6 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             if flow.inflow is None
             else f"flow.inflow brings {flow.inflow.volume:.4g} m³/m",
         ),
-        Rule(
-            "materials",
-            len(flow.materials) > 1,
-            "a deposit has a material of its own" if len(flow.materials) > 1 else "all have the flow's material",
-        ),
     ]
 
 

@@ -68,8 +68,6 @@ class Effects:
     """Some of the flow arrives at a section during the run."""
     profile: bool = False
     """The ground has many pieces, of which a point looks at those about its column of the grid alone."""
-    materials: bool = False
-    """Some material points have a skeleton of their own, of the same law."""
 
     @property
     def liquid(self) -> bool:
@@ -140,7 +138,6 @@ class Effects:
                 "passing",
                 "arriving",
                 "profile",
-                "materials",
             )
             if getattr(self, name)
         ]

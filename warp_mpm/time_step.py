@@ -160,11 +160,7 @@ def step_limits(scenario: Scenario) -> StepLimits:
     Raises:
         ValueError: sound through a material has no finite speed.
     """
-    flow = scenario.flow
-    limits, *others = (
-        _limits(scenario.model_copy(update={"flow": flow.model_copy(update={"material": material})}))
-        for material in flow.materials
-    )
+    limits, *others = (_limits(scenario.of_material(place)) for place in range(len(scenario.flow.materials)))
     for other in others:
         limits = StepLimits(
             max(limits.wave_speed, other.wave_speed),

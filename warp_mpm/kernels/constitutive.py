@@ -82,7 +82,6 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
-    MATERIALS = effects.materials
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
     SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
@@ -262,8 +261,6 @@ def make_constitutive(
         Points that have left pass through as well, as `leave` has made them: at rest, so that nothing changes.
         """
         p = wp.tid()
-        if MATERIALS:
-            parameters = points.materials[read(points.material, p)]
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
         divergence = trace(gradient)
@@ -365,8 +362,6 @@ def make_constitutive(
         def yielding(points: Points, parameters: Parameters, book: Book):
             """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
             p = wp.tid()
-            if MATERIALS:
-                parameters = points.materials[read(points.material, p)]
             gap = F(0.0)
             if OPENS:
                 gap = read(points.solid_gap, p)

@@ -327,9 +327,6 @@ def layout(effects: Effects) -> SimpleNamespace:
         }
         types.Arrival = _structure("Arrival", arrival)
     types.Parameters = _structure("Parameters", parameters)
-    if effects.materials:
-        points["material"] = array(dtype=wp.int32)  # place in the next
-        points["materials"] = array(dtype=types.Parameters)
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)
     types.Bodies = _structure("Bodies", bodies)

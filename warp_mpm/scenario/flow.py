@@ -411,6 +411,10 @@ class _FlowBase(Model):
         """All of the scene's, the flow's first, then those that are its deposits' own."""
         return [self.material, *(self.material_of(deposit) for deposit in self.deposits if deposit.material)]
 
+    def of_material(self, place: int) -> Self:
+        """The flow as if all of it were of one of its materials."""
+        return self.model_copy(update={"material": self.materials[place]}) if place else self
+
     @property
     def polygon(self) -> geometry.Polygon:
         """Outline at t = 0, vertices [V, 2] in metres; of a flow that only arrives the box of its volume and depth that

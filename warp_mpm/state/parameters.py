@@ -10,7 +10,7 @@ from typing import Any
 from ..effects import Effects
 from ..grid import GridLayout
 from ..kernels import layout as at
-from ..scenario import STANDARD_GRAVITY, Scenario, Skeleton, Trapezoid
+from ..scenario import STANDARD_GRAVITY, Scenario, Trapezoid
 from ..simulator.bodies import Body
 from ..simulator.bodies.of_scene import BARRIER
 from ..simulator.bodies.outline import ENDLESS
@@ -31,7 +31,7 @@ def kernel_parameters(
     """The kernels' `Parameters`; those of an effect that is absent have no field there.
 
     Args:
-        scenario: the scene.
+        scenario: the scene, as of one of its materials (`Scenario.of_material`).
         effects: its effects.
         types: of the kernels, from `layout`.
         bodies: all that the flow meets.
@@ -39,29 +39,11 @@ def kernel_parameters(
         limits: on the time step.
         workers: threads that share the blocks of the grid in use.
     """
-    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(
-        scenario, effects, limits, scenario.flow.material
-    )
+    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(scenario, effects, limits)
     if effects.liquid:
         values |= _liquid(scenario, effects, limits)
     if effects.liquid and effects.bodies:
         values |= _crest(scenario, bodies)
-    return _filled(types, values)
-
-
-def material_parameters(
-    scenario: Scenario, effects: Effects, types: SimpleNamespace, common: Any, *, limits: StepLimits
-) -> list[Any]:
-    """The same for each of the scene's materials: what its skeleton has otherwise, in place of the flow's."""
-    names = [name for name in types.parameter_fields if hasattr(common, name)]
-    found = []
-    for material in scenario.flow.materials:
-        values = {name: getattr(common, name) for name in names}
-        found.append(_filled(types, values | _skeleton(scenario, effects, limits, material)))
-    return found
-
-
-def _filled(types: SimpleNamespace, values: dict[str, Any]) -> Any:
     parameters = types.Parameters()
     for name, value in values.items():
         setattr(parameters, name, types.X(*value) if isinstance(value, tuple) else value)
@@ -90,8 +72,8 @@ def _grid_and_clock(
     } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.speed)
 
 
-def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits, material: Skeleton) -> dict[str, Any]:
-    numerics = scenario.numerics
+def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
+    material, numerics = scenario.flow.material, scenario.numerics
     values: dict[str, Any] = {
         "solid_density": moving_density(scenario),
         "lame": material.lame_modulus,
