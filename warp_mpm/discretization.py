@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm import geometry
-from warp_mpm.scenario import Inflow, Scenario
+from warp_mpm.scenario import Inflow, Scenario, Skeleton
 from warp_mpm.scenario.inflow import APPROACH
 from warp_mpm.simulator.laws import LAWS
 
@@ -20,7 +20,7 @@ SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
 
 
-class Stretch(NamedTuple):
+class Span(NamedTuple):
     """Points of one material that follow each other, from `begin` to before `end`."""
 
     material: int
@@ -57,10 +57,10 @@ class MaterialPoints:
     """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
 
     @property
-    def stretches(self) -> list[Stretch]:
+    def spans(self) -> list[Span]:
         """Parts of one material each, in their order, that are as long as can be."""
         ends = [*(np.flatnonzero(np.diff(self.material)) + 1).tolist(), len(self.material)]
-        return [Stretch(int(self.material[begin]), begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
+        return [Span(int(self.material[begin]), begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
 
     @property
     def there(self) -> int:
@@ -99,9 +99,8 @@ class _Part:
     """[N] dy/dx of the long slope whose stress it has."""
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
+    material: Skeleton
     velocity: tuple[float, float] = (0.0, 0.0)
-    material: int = 0
-    """Place among the flow's materials."""
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -290,36 +289,37 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     parts: list[_Part] = []
     ratio, lateral = flow.initial_pore_pressure_ratio, flow.lateral_stress_ratio
     if flow.shape is not None:
-        parts.append(_Part(*_filled(scenario, flow.shape.polygon), ratio, lateral, flow.velocity_m_per_s))
-    others = 0
+        filled = _filled(scenario, flow.shape.polygon)
+        parts.append(_Part(*filled, ratio, lateral, flow.material, flow.velocity_m_per_s))
     for deposit in flow.deposits:
-        own, number = deposit.lateral_stress_coefficient, 0
-        if deposit.material:
-            others = number = others + 1
-            own = LAWS.named(flow.material.law).lateral_stress_ratio(flow.material_of(deposit)) if own is None else own
-        filled = _filled(scenario, deposit.shape.polygon)
-        parts.append(_Part(*filled, None, lateral if own is None else own, material=number))
+        own, material = deposit.lateral_stress_coefficient, flow.material_of(deposit)
+        if own is None:
+            other = deposit.material is not None or deposit.formulation is not None
+            own = LAWS.named(material.law).lateral_stress_ratio(material) if other else lateral
+        parts.append(_Part(*_filled(scenario, deposit.shape.polygon), None, own, material))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
         own_ratio = ratio if coming.pore_pressure_ratio is None else coming.pore_pressure_ratio
         slope = np.full(len(coming.volume), flow.inflow.slope)
-        parts.append(_Part(coming.position, coming.volume, coming.below, slope, own_ratio, lateral))
+        parts.append(_Part(coming.position, coming.volume, coming.below, slope, own_ratio, lateral, flow.material))
         entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
     stresses = [_initial_stress(scenario, part) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
+    materials = flow.materials
+    place = np.repeat([materials.index(part.material) for part in parts], [len(part.volume) for part in parts])
     return MaterialPoints(
         position=np.concatenate([part.position for part in parts]),
         volume=volume,
-        solid_mass=flow.material.solid_partial_density * volume,
-        liquid_mass=flow.material.liquid_partial_density * volume,
+        solid_mass=np.array([material.solid_partial_density for material in materials])[place] * volume,
+        liquid_mass=np.array([material.liquid_partial_density for material in materials])[place] * volume,
         effective_stress=np.concatenate([effective for effective, _ in stresses]),
         pore_pressure=np.concatenate([pore for _, pore in stresses]),
         velocity=np.concatenate([np.tile(np.array(part.velocity), (len(part.volume), 1)) for part in parts]),
         entry=entry,
         pace=pace,
-        material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
+        material=place.astype(np.int32),
     )
 
 
@@ -332,7 +332,7 @@ def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array
 
 def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
     """Effective stress [N, 4] and pore pressure [N] of a part of the scene."""
-    flow, material = scenario.flow, scenario.flow.material
+    flow, material = scenario.flow, part.material
     pore_pressure = np.zeros(len(part.volume))
     effective_stress = np.zeros((len(part.volume), 4))
     if flow.initial_stress == "geostatic":

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .channel import Channel
 from .discretization import MaterialPoints, material_points
-from .effect_rules import derive_effects
+from .effect_rules import derive_effects, kind_of
 from .grid import fit_grid
 from .kernels import layout as at
 from .kernels.build import build_kernels
@@ -34,7 +34,7 @@ from .simulator.bodies.loads import Patches, slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
-from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, stretched
+from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
 from .state.parameters import kernel_parameters
@@ -240,10 +240,16 @@ class Simulation:
                 grid=self.grid,
                 limits=self._limits,
                 workers=self._workers,
+                liquid_density=getattr(scenario.flow.wettest, "liquid_density_kg_per_m3", 0.0),
             )
             for place in range(len(scenario.flow.materials))
         ]
         self._parameters = self._of_materials[0]
+        self._kinds = [
+            self.effects.kinds.index(kind_of(material)) if self.effects.kinds else 0
+            for material in scenario.flow.materials
+        ]
+        """Of each material, its place among the kinds of kernels over points."""
         with memory_for(scenario):
             initial = material_points(scenario)
             if channel is not None:
@@ -291,23 +297,23 @@ class Simulation:
             effects,
             types,
             initial,
-            liquid_bulk_modulus=self._of_each("liquid_bulk_modulus_Pa"),
+            liquid_stiffness=self._stiffness_of_liquid(),
             device=device,
         )
         self._points, self._point_arrays = points.structure, points.arrays
-        # Points of a material lie one after the other, and kernels go over one such stretch after the other, each with
+        # Points of a material lie one after the other, and kernels go over one such span after the other, each with
         # numbers that are the same for all of it: a loop that looked them up at each point would not be vectorised.
-        self._stretches = [
+        self._spans = [
             (part, {"points": self._points, "parameters": self._parameters})
-            if len(initial.stretches) == 1
+            if len(initial.spans) == 1
             else (
                 part,
                 {
-                    "points": stretched(points, types, part.begin, part.end),
+                    "points": span_of(points, types, part.begin, part.end),
                     "parameters": self._of_materials[part.material],
                 },
             )
-            for part in initial.stretches
+            for part in initial.spans
         ]
         grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
@@ -350,8 +356,8 @@ class Simulation:
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
-    def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
-        kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
+    def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any], kernels: Any = None) -> None:
+        kernel, kept = getattr(kernels or self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
         if self._commands is not None and command is not None:  # of no threads there is none
             self._commands.append((launch.kernel, command))
@@ -366,12 +372,13 @@ class Simulation:
                 self._launch(launch, self._counts[launch.over], [self._arguments[name] for name in launch.takes])
 
     def _launch_over_points(self, launch: Launch) -> None:
-        """Once for each stretch of points of one material, as far as they can have arrived."""
-        for part, own in self._stretches:
+        """Once for each span of points of one material, as far as they can have arrived."""
+        for part, own in self._spans:
             arguments = self._arguments | own
             count = self._workers if launch is LEDGER else min(self._counts["points"], part.end) - part.begin
-            if count > 0:
-                self._launch(launch, count, [arguments[name] for name in launch.takes])
+            kernels = self._kernels.of_kinds[self._kinds[part.material]]
+            if count > 0 and hasattr(kernels, launch.kernel):  # some are only another kind's
+                self._launch(launch, count, [arguments[name] for name in launch.takes], kernels)
 
     def _start(self) -> None:
         self._launch(START, 1, [self._arguments[name] for name in START.takes])
@@ -422,7 +429,7 @@ class Simulation:
     @property
     def launched_kernels(self) -> tuple[str, ...]:
         """Names of the kernels that a step launches, in their order, as captured; the first call compiles them. Those
-        over points are launched once for each stretch of points of one material."""
+        over points are launched once for each span of points of one material."""
         self.prepare()
         return self._kernels_of_a_step
 
@@ -554,7 +561,7 @@ class Simulation:
                 self._point_arrays[name].assign(values)
         self._point_arrays["stress"].assign(now["effective_stress"])
         if self.effects.liquid:
-            self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._of_each("liquid_bulk_modulus_Pa"))
+            self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._stiffness_of_liquid())
         clock = self._clock.numpy()
         clock[at.SPEED_MAX] = (velocity.reshape(-1, self.effects.dimensions) ** 2).sum(axis=1).max()
         self._clock.assign(clock)
@@ -708,6 +715,11 @@ class Simulation:
         shown = quantities if names is None else names
         kept = self.effects.point_fields
         return {name: stored(name) if name in kept else quantities[name]() for name in shown}
+
+    def _stiffness_of_liquid(self) -> NDArray[np.float64]:
+        """Bulk modulus of each point's liquid [N] [Pa]; infinite where there is none, which bears no pressure."""
+        modulus = self._of_each("liquid_bulk_modulus_Pa")
+        return np.where(modulus > 0.0, modulus, math.inf)
 
     def _of_each(self, name: str) -> NDArray[np.float64]:
         """A field of each point's material [N]; 0 where that has none."""

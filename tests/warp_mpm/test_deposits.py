@@ -62,9 +62,24 @@ def test_volumes_tell_the_flow_from_its_deposits():
         ([{"shape": HEAP["shape"] | {"to_m": 2}}], r"flow.deposits\[0\] lies inside the barrier by"),
         ([HEAP, HEAP], r"flow.deposits\[0\] and flow.deposits\[1\] lie in one place; they must not overlap"),
         (
-            [HEAP | {"material": {"porosity": 0.3}}],
-            r"deposits\[0\].material.porosity is not allowed; a deposit may diff",
+            [HEAP | {"material": {"porosty": 0.3}}],
+            r'deposits\[0\].material.porosty is not allowed; a material with the formulation "two_phase" and the law',
         ),
+        (
+            [HEAP | {"formulation": "dry", "material": {"liquid_density_kg_per_m3": 900}}],
+            r'deposits\[0\].material.liquid_density_kg_per_m3 is not allowed; a material with the formulation "dry"',
+        ),
+        (
+            [HEAP | {"formulation": "undrained"}],
+            r'deposits\[0\].formulation = "undrained" is not allowed, .* it must be "two_phase" or "dry"',
+        ),
+        (
+            [HEAP | {"material": {"porosity_update": True}}],
+            r"deposits\[0\].material.porosity_update = true is not allowed, .* it must be false",
+        ),
+        ([HEAP | {"material": {"law": "mud"}}], r'deposits\[0\].material.law = "mud" is not known; it must be one of'),
+        ([HEAP | {"material": {"law": "mu_i"}}], r"deposits\[0\].material: .*is missing"),
+        ([HEAP | {"material": {"porosity": 1.4}}], r"deposits\[0\].material: porosity = 1.4 is not allowed"),
         ([HEAP | {"material": {"poisson_ratio": 0.6}}], r"deposits\[0\].material: poisson_ratio = 0.6 is not allowed"),
         ([HEAP | {"material": {"dilatancy_angle_deg": 30}}], r"deposits\[0\].material: .*must not exceed"),
     ],

@@ -50,12 +50,12 @@ def point_arrays(
     types: SimpleNamespace,
     initial: MaterialPoints,
     *,
-    liquid_bulk_modulus: NDArray[np.float64],
+    liquid_stiffness: NDArray[np.float64],
     device: Any,
 ) -> Group:
     """State of the material points at the start; fields that nothing is said of begin at 0.
 
-    `liquid_bulk_modulus` is that of each point [N] [Pa].
+    `liquid_stiffness` is the bulk modulus of each point's liquid [N] [Pa], infinite where there is none.
     """
     count = len(initial.volume)
     given: dict[str, Any] = {
@@ -69,7 +69,7 @@ def point_arrays(
     if effects.arriving:
         given["pace"] = initial.pace
     if effects.liquid:
-        given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
+        given["liquid_strain"] = -initial.pore_pressure / liquid_stiffness
     for name, field in effects.point_fields.items():
         start = field.start(scenario, initial) if callable(field.start) else field.start
         shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
@@ -77,7 +77,7 @@ def point_arrays(
     return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
 
 
-def stretched(points: Group, types: SimpleNamespace, begin: int, end: int) -> Any:
+def span_of(points: Group, types: SimpleNamespace, begin: int, end: int) -> Any:
     """The structure of the points from `begin` to before `end`: a look at the same arrays."""
     structure = types.Points()
     for name, array in points.arrays.items():
