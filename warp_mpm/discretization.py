@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm import geometry
-from warp_mpm.scenario import Inflow, Scenario
+from warp_mpm.scenario import Inflow, Scenario, Skeleton
 from warp_mpm.scenario.inflow import APPROACH
 from warp_mpm.simulator.laws import LAWS
 
@@ -17,6 +18,15 @@ Array = NDArray[np.float64]
 
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
+
+
+class Span(NamedTuple):
+    """Points of one material that follow each other, from `begin` to before `end`."""
+
+    material: int
+    """Place among the flow's materials."""
+    begin: int
+    end: int
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,12 @@ class MaterialPoints:
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
     material: NDArray[np.int32]
     """[N] place of its material among those of the flow (`scenario.flow.materials`)."""
+
+    @property
+    def spans(self) -> list[Span]:
+        """Parts of one material each, in their order, that are as long as can be."""
+        ends = [*(np.flatnonzero(np.diff(self.material)) + 1).tolist(), len(self.material)]
+        return [Span(int(self.material[begin]), begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
 
     @property
     def there(self) -> int:
@@ -83,10 +99,9 @@ class _Part:
     """[N] dy/dx of the long slope whose stress it has."""
     pore_pressure_ratio: float | Array | None
     lateral_stress_ratio: float
+    material: Skeleton
     velocity: tuple[float, float] | Array = (0.0, 0.0)
     """Of all, or [N, 2] [m/s]."""
-    material: int = 0
-    """Place among the flow's materials."""
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -279,15 +294,14 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     if flow.shape is not None:
         filled = _filled(scenario, flow.shape.polygon)
         ratio = flow.pore_pressure_ratio(filled[0][:, 0])
-        parts.append(_Part(*filled, ratio, lateral, _velocity(scenario, flow.shape.polygon, *filled[:3])))
-    others = 0
+        velocity = _velocity(scenario, flow.shape.polygon, *filled[:3])
+        parts.append(_Part(*filled, ratio, lateral, flow.material, velocity))
     for deposit in flow.deposits:
-        own, number = deposit.lateral_stress_coefficient, 0
-        if deposit.material:
-            others = number = others + 1
-            own = LAWS.named(flow.material.law).lateral_stress_ratio(flow.material_of(deposit)) if own is None else own
-        filled = _filled(scenario, deposit.shape.polygon)
-        parts.append(_Part(*filled, None, lateral if own is None else own, material=number))
+        own, material = deposit.lateral_stress_coefficient, flow.material_of(deposit)
+        if own is None:
+            other = deposit.material is not None or deposit.formulation is not None
+            own = LAWS.named(material.law).lateral_stress_ratio(material) if other else lateral
+        parts.append(_Part(*_filled(scenario, deposit.shape.polygon), None, own, material))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
@@ -296,21 +310,23 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         if coming.pore_pressure_ratio is None:
             ratio = flow.pore_pressure_ratio(np.full(len(coming.volume), flow.inflow.x_m))
         slope = np.full(len(coming.volume), flow.inflow.slope)
-        parts.append(_Part(coming.position, coming.volume, coming.below, slope, ratio, lateral))
+        parts.append(_Part(coming.position, coming.volume, coming.below, slope, ratio, lateral, flow.material))
         entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
     stresses = [_initial_stress(scenario, part) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
+    materials = flow.materials
+    place = np.repeat([materials.index(part.material) for part in parts], [len(part.volume) for part in parts])
     return MaterialPoints(
         position=np.concatenate([part.position for part in parts]),
         volume=volume,
-        solid_mass=flow.material.solid_partial_density * volume,
-        liquid_mass=flow.material.liquid_partial_density * volume,
+        solid_mass=np.array([material.solid_partial_density for material in materials])[place] * volume,
+        liquid_mass=np.array([material.liquid_partial_density for material in materials])[place] * volume,
         effective_stress=np.concatenate([effective for effective, _ in stresses]),
         pore_pressure=np.concatenate([pore for _, pore in stresses]),
         velocity=np.concatenate([np.broadcast_to(part.velocity, (len(part.volume), 2)) for part in parts]),
         entry=entry,
         pace=pace,
-        material=np.concatenate([np.full(len(part.volume), part.material, dtype=np.int32) for part in parts]),
+        material=place.astype(np.int32),
     )
 
 
@@ -342,7 +358,7 @@ def _velocity(
 
 def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
     """Effective stress [N, 4] and pore pressure [N] of a part of the scene."""
-    flow, material = scenario.flow, scenario.flow.material
+    flow, material = scenario.flow, part.material
     pore_pressure = np.zeros(len(part.volume))
     effective_stress = np.zeros((len(part.volume), 4))
     if flow.initial_stress == "geostatic":

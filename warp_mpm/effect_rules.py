@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .effects import Effects
-from .scenario import DryFlow, Ground, Scenario, TwoPhaseFlow
+from .effects import Effects, Kind
+from .scenario import DryFlow, Ground, Scenario, Skeleton, TwoPhaseFlow, TwoPhaseMaterial, UndrainedMaterial
+from .scenario.flow import formulation_of
 from .simulator.bodies.of_scene import ground_body
 from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
@@ -20,7 +21,7 @@ class Rule:
 
     effect: str
     """Name of the field of `Effects`."""
-    value: str | bool
+    value: str | bool | tuple[Kind, ...]
     reason: str
     """Why, in the words of the scenario file."""
     switched: Mapping[str, Any] = field(default_factory=dict)
@@ -29,7 +30,7 @@ class Rule:
     @property
     def on(self) -> bool:
         """Whether the effect is present."""
-        return self.value not in (False, "none", "constant")
+        return self.value not in (False, "none", "constant", ())
 
 
 def derive_effects(scenario: Scenario) -> Effects:
@@ -44,22 +45,33 @@ def effect_rules(scenario: Scenario) -> list[Rule]:
 
 
 def _material_rules(scenario: Scenario) -> list[Rule]:
-    flow = scenario.flow
-    drag: str = scenario.numerics.drag if isinstance(flow, TwoPhaseFlow) else "none"
-    two_phase = isinstance(flow, TwoPhaseFlow)
-    inertial = flow.material.inertial_drag_coefficient if isinstance(flow, TwoPhaseFlow) else 0.0
-    porosity = isinstance(flow, TwoPhaseFlow) and flow.material.porosity_update
-    conductivity = flow.material.conductivity_law if isinstance(flow, TwoPhaseFlow) else "constant"
-    dilatancy = flow.material.dilatancy
+    flow, materials = scenario.flow, scenario.flow.materials
+    wettest = flow.wettest
+    formulation = flow.wettest_formulation
+    two_phase = isinstance(wettest, TwoPhaseMaterial)
+    drag: str = scenario.numerics.drag if two_phase else "none"
+    inertial = max(getattr(material, "inertial_drag_coefficient", 0.0) for material in materials)
+    porosity = isinstance(wettest, TwoPhaseMaterial) and wettest.porosity_update
+    conductivity = wettest.conductivity_law if isinstance(wettest, TwoPhaseMaterial) else "constant"
+    dilatancy = next((material.dilatancy for material in materials if material.dilatancy is not None), None)
+    kinds = tuple(dict.fromkeys(kind_of(material) for material in materials))
+    differ = formulation != "dry" and len({_told_to_nodes(material) for material in materials}) > 1
     return [
-        Rule("formulation", flow.formulation, f"flow.formulation = {flow.formulation}", without_liquid(scenario)),
+        Rule(
+            "formulation",
+            formulation,
+            f"flow.formulation = {flow.formulation}"
+            if formulation == flow.formulation
+            else f"a deposit has the formulation {formulation}",
+            without_liquid(scenario),
+        ),
         Rule("law", LAWS.key(flow.material.law), f"flow.material.law = {flow.material.law}", _another_law(scenario)),
         Rule(
             "drag",
             drag,
             f"two phases, numerics.drag = {drag}" if drag != "none" else "there are no two phases",
             {"numerics.drag": {"semi_implicit": "explicit", "explicit": "semi_implicit"}[drag]}
-            if isinstance(flow, TwoPhaseFlow) and flow.material.may_be_explicit
+            if all(getattr(material, "may_be_explicit", True) for material in materials) and two_phase
             else {},
         ),
         Rule(
@@ -67,21 +79,23 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             inertial > 0.0,
             f"flow.material.inertial_drag_coefficient = {inertial:g}" if two_phase else "there are no two phases",
             {"flow.material.inertial_drag_coefficient": 0.0 if inertial > 0.0 else 0.5}
-            if drag == "semi_implicit"
+            if drag == "semi_implicit" and len(materials) == 1
             else {},
         ),
         Rule(
             "porosity_update",
             porosity,
             _setting("flow.material.porosity_update", porosity) if two_phase else "there are no two phases",
-            {"flow.material.porosity_update": not porosity} if two_phase and conductivity == "constant" else {},
+            {"flow.material.porosity_update": not porosity}
+            if two_phase and conductivity == "constant" and len(materials) == 1
+            else {},
         ),
         Rule(
             "conductivity",
             conductivity,
             f"flow.material.conductivity_law = {conductivity}" if two_phase else "there are no two phases",
             {"flow.material.conductivity_law": "kozeny_carman" if conductivity == "constant" else "constant"}
-            if porosity and drag == "semi_implicit"
+            if porosity and drag == "semi_implicit" and len(materials) == 1
             else {},
         ),
         Rule(
@@ -90,7 +104,21 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             "flow.material.dilatancy is not given"
             if dilatancy is None
             else f"flow.material.dilatancy.coefficient = {dilatancy.coefficient:g}",
-            {"flow.material.dilatancy": None} if dilatancy is not None else {},
+            {"flow.material.dilatancy": None} if dilatancy is not None and len(materials) == 1 else {},
+        ),
+        Rule(
+            "materials",
+            differ,
+            "masses per volume or drag differ between materials"
+            if differ
+            else "one material"
+            if len(materials) == 1
+            else "the nodes need no material's own numbers",
+        ),
+        Rule(
+            "kinds",
+            kinds if len(kinds) > 1 else (),
+            "laws, or what is wet, differ between materials" if len(kinds) > 1 else "one kind of material",
         ),
         Rule(
             "arriving",
@@ -99,17 +127,34 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             if flow.inflow is None
             else f"flow.inflow brings {flow.inflow.volume:.4g} m³/m",
         ),
-        Rule(
-            "materials",
-            len(flow.materials) > 1,
-            "a deposit has a material of its own" if len(flow.materials) > 1 else "all have the flow's material",
-        ),
     ]
+
+
+def kind_of(material: Skeleton) -> Kind:
+    """The kind of a material, by which kernels are compiled."""
+    return Kind(LAWS.key(material.law), formulation_of(material) != "dry", material.dilatancy is not None)
+
+
+def _told_to_nodes(material: Skeleton) -> tuple[float, ...]:
+    """What nodes sum up of a material, per mass of what moves with the solid, where it differs between materials."""
+    if not isinstance(material, UndrainedMaterial):
+        return ()
+    if not isinstance(material, TwoPhaseMaterial):
+        return (material.liquid_density_kg_per_m3 / material.density,)
+    solid = material.solid_partial_density
+    return (
+        material.liquid_density_kg_per_m3 / solid,
+        material.liquid_partial_density / solid,
+        material.intrinsic_permeability,
+        material.hydraulic_conductivity,
+        material.inertial_drag_coefficient,
+        material.porosity,
+    )
 
 
 def _numerical_rules(scenario: Scenario) -> list[Rule]:
     numerics = scenario.numerics
-    liquid = not isinstance(scenario.flow, DryFlow)
+    liquid = scenario.flow.wettest_formulation != "dry"
     corrected = numerics.density_correction > 0.0 and numerics.volumetric_smoothing
     relaxation = f"numerics.pressure_relaxation = {numerics.pressure_relaxation:g}"
     return [
@@ -261,7 +306,10 @@ def _switch_friction(scenario: Scenario, changes: dict[str, Any], rubs: bool) ->
 
 
 def without_liquid(scenario: Scenario) -> dict[str, Any]:
-    """Changes that make a two-phase flow undrained, and an undrained one dry; none for a dry one."""
+    """Changes that make a two-phase flow undrained, and an undrained one dry; none for a dry one, nor where materials
+    differ."""
+    if len(scenario.flow.materials) > 1:
+        return {}
     flow = scenario.resolved()["flow"]
     material = flow["material"]
     if isinstance(scenario.flow, DryFlow):
@@ -301,7 +349,10 @@ def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
 
 
 def _another_law(scenario: Scenario) -> dict[str, Any]:
-    """Changes to the first other law that needs no figure which the scene does not give; none where there is none."""
+    """Changes to the first other law that needs no figure which the scene does not give; none where there is none, nor
+    where materials differ."""
+    if len(scenario.flow.materials) > 1:
+        return {}
     for law in LAWS:
         needed = any(field.is_required() for field in law.Settings.model_fields.values())
         if law.name != scenario.flow.material.law and not needed:

@@ -16,6 +16,20 @@ LONGEST_NAME = 220
 
 
 @dataclass(frozen=True)
+class Kind:
+    """What the kernels over points of one material depend on beside what is common to the scene."""
+
+    law: str
+    """Key of the law of its skeleton."""
+    wet: bool
+    """Its voids are full of liquid."""
+    dilatancy: bool = False
+
+    def __str__(self) -> str:
+        return "-".join([self.law, *(["wet"] if self.wet else ["dry"]), *(["dilatancy"] if self.dilatancy else [])])
+
+
+@dataclass(frozen=True)
 class Effects:
     """What is simulated, and nothing else: an effect that is off is not compiled, not launched and has no arrays.
 
@@ -66,10 +80,13 @@ class Effects:
     """Some body moves relative to the grid, so that its places of contact are found anew in every step."""
     arriving: bool = False
     """Some of the flow arrives at a section during the run."""
+    materials: bool = False
+    """Materials differ in what a node must know of them per mass of the solid, so that the points tell it."""
+    kinds: tuple[Kind, ...] = ()
+    """Kinds of the scene's materials, that of the flow first, where there are several; `law` is then that of the first,
+    the formulation that of the wettest, and a scene dilates where one of them does."""
     profile: bool = False
     """The ground has many pieces, of which a point looks at those about its column of the grid alone."""
-    materials: bool = False
-    """Some material points have a skeleton of their own, of the same law."""
 
     @property
     def liquid(self) -> bool:
@@ -87,10 +104,34 @@ class Effects:
         return SCHEMES.keyed(self.transfer)
 
     @property
+    def of_kinds(self) -> tuple[Effects, ...]:
+        """What kernels over the points of each kind of material are specialised on: these effects where there is one
+        kind, and of a dry one in a wet scene those of a dry scene."""
+        if not self.kinds:
+            return (self,)
+        dry: dict[str, Any] = {"formulation": "dry", "pressure_relaxation": False, "drag": "none"}
+        dry |= {"inertial_drag": False, "porosity_update": False, "conductivity": "constant"}
+        return tuple(
+            replace(self, kinds=(), law=kind.law, dilatancy=kind.dilatancy, **({} if kind.wet else dry))
+            for kind in self.kinds
+        )
+
+    @property
+    def laws(self) -> list[Law]:
+        """The laws of all skeletons, each once."""
+        return [LAWS.keyed(key) for key in dict.fromkeys([kind.law for kind in self.kinds] or [self.law])]
+
+    @property
+    def partly_dry(self) -> bool:
+        """Some points hold liquid and some do not."""
+        return self.liquid and any(not kind.wet for kind in self.kinds)
+
+    @property
     def point_fields(self) -> dict[str, PointField]:
-        """What a point stores for the law and for the scheme."""
+        """What a point stores for the laws and for the scheme."""
+        of_laws = {name: field for law in self.laws for name, field in law.point_fields.items()}
         across = self.scheme.point_fields_in_space if self.dimensions == 3 else {}
-        return {**self.skeleton.point_fields, **self.scheme.point_fields, **across}
+        return {**of_laws, **self.scheme.point_fields, **across}
 
     @property
     def two_phase(self) -> bool:
@@ -139,13 +180,14 @@ class Effects:
                 "joined",
                 "passing",
                 "arriving",
-                "profile",
                 "materials",
+                "profile",
             )
             if getattr(self, name)
         ]
         if self.conductivity != "constant":
             flags.append(self.conductivity)
+        flags += map(str, self.kinds)
         name = "warp_mpm." + "-".join(flags)
         if len(name) > LONGEST_NAME:  # of a file, with what Warp adds to it
             name = name[: LONGEST_NAME - 17] + "-" + hashlib.sha256(name.encode()).hexdigest()[:16]

@@ -241,7 +241,7 @@ def travel_of(barrier: Barrier, scenario: Scenario) -> Travel:
     assert mass is not None
     held = barrier.motion.base_friction_coefficient * abs(gy)
     # The momentum of a flow that is all as fast as its front, shared with the barrier; friction at its base stops it.
-    flow_mass = (flow.volume + flow.deposited_volume) * flow.material.density
+    flow_mass = flow.volume * flow.material.density + flow.deposited_mass
     front = flow.greatest_speed + 2.0 * math.sqrt(abs(gy) * flow.depth)
     pushed = flow_mass / (flow_mass + mass) * front
     slowed = held - gx

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .channel import Channel
 from .discretization import MaterialPoints, material_points
-from .effect_rules import derive_effects
+from .effect_rules import derive_effects, kind_of
 from .grid import fit_grid
 from .kernels import layout as at
 from .kernels.build import build_kernels
@@ -34,10 +34,10 @@ from .simulator.bodies.loads import Patches, slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
-from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays
+from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
-from .state.parameters import kernel_parameters, material_parameters
+from .state.parameters import kernel_parameters
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
@@ -231,15 +231,25 @@ class Simulation:
         """The step [s] against which times are told apart: see `time_step.nominal_step`."""
         # One worker walks the list of blocks on the CPU; on a GPU there are as many as keep it busy.
         self._workers = 1 if self.device.is_cpu else 65536
-        self._parameters = kernel_parameters(
-            scenario,
-            self.effects,
-            self._types,
-            bodies=self.bodies,
-            grid=self.grid,
-            limits=self._limits,
-            workers=self._workers,
-        )
+        self._of_materials = [
+            kernel_parameters(
+                scenario.of_material(place),
+                self.effects,
+                self._types,
+                bodies=self.bodies,
+                grid=self.grid,
+                limits=self._limits,
+                workers=self._workers,
+                liquid_density=getattr(scenario.flow.wettest, "liquid_density_kg_per_m3", 0.0),
+            )
+            for place in range(len(scenario.flow.materials))
+        ]
+        self._parameters = self._of_materials[0]
+        self._kinds = [
+            self.effects.kinds.index(kind_of(material)) if self.effects.kinds else 0
+            for material in scenario.flow.materials
+        ]
+        """Of each material, its place among the kinds of kernels over points."""
         with memory_for(scenario):
             initial = material_points(scenario)
             if channel is not None:
@@ -247,6 +257,7 @@ class Simulation:
             _check_room(bodies, initial, self.grid.spacing)
             self.material_points = len(initial.volume)
             self._solid_mass, self._liquid_mass = initial.solid_mass, initial.liquid_mass
+            self._material = initial.material
             self._make_arrays(initial)
         self._arguments: dict[str, Any] = self._clock_arrays | {
             "points": self._points,
@@ -285,22 +296,29 @@ class Simulation:
 
     def _make_arrays(self, initial: MaterialPoints) -> None:
         scenario, effects, types, device = self.scenario, self.effects, self._types, self.device
-        bulk_modulus = self._parameters.liquid_bulk_modulus if effects.liquid else 0.0
-        materials = (
-            material_parameters(scenario, effects, types, self._parameters, limits=self._limits)
-            if effects.materials
-            else []
-        )
         points = point_arrays(
             scenario,
             effects,
             types,
             initial,
-            liquid_bulk_modulus=bulk_modulus,
-            materials=materials,
+            liquid_stiffness=self._stiffness_of_liquid(),
             device=device,
         )
         self._points, self._point_arrays = points.structure, points.arrays
+        # Points of a material lie one after the other, and kernels go over one such span after the other, each with
+        # numbers that are the same for all of it: a loop that looked them up at each point would not be vectorised.
+        self._spans = [
+            (part, {"points": self._points, "parameters": self._parameters})
+            if len(initial.spans) == 1
+            else (
+                part,
+                {
+                    "points": span_of(points, types, part.begin, part.end),
+                    "parameters": self._of_materials[part.material],
+                },
+            )
+            for part in initial.spans
+        ]
         grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
         solid = body_arrays(self.bodies, effects, types, self.grid, scenario.gravity.vector, device=device)
@@ -342,8 +360,8 @@ class Simulation:
 
     # -- stepping ----------------------------------------------------------------------------------------------
 
-    def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any]) -> None:
-        kernel, kept = getattr(self._kernels, launch.kernel), self._commands is not None
+    def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any], kernels: Any = None) -> None:
+        kernel, kept = getattr(kernels or self._kernels, launch.kernel), self._commands is not None
         command = wp.launch(kernel, dim=dim, inputs=list(arguments), device=self.device, record_cmd=kept)
         if self._commands is not None and command is not None:  # of no threads there is none
             self._commands.append((launch.kernel, command))
@@ -352,7 +370,19 @@ class Simulation:
 
     def _step(self) -> None:
         for launch in launches(self.effects):
-            self._launch(launch, self._counts[launch.over], [self._arguments[name] for name in launch.takes])
+            if launch.over == "points":
+                self._launch_over_points(launch)
+            else:
+                self._launch(launch, self._counts[launch.over], [self._arguments[name] for name in launch.takes])
+
+    def _launch_over_points(self, launch: Launch) -> None:
+        """Once for each span of points of one material, as far as they can have arrived."""
+        for part, own in self._spans:
+            arguments = self._arguments | own
+            count = self._workers if launch is LEDGER else min(self._counts["points"], part.end) - part.begin
+            kernels = self._kernels.of_kinds[self._kinds[part.material]]
+            if count > 0 and hasattr(kernels, launch.kernel):  # some are only another kind's
+                self._launch(launch, count, [arguments[name] for name in launch.takes], kernels)
 
     def _start(self) -> None:
         self._launch(START, 1, [self._arguments[name] for name in START.takes])
@@ -363,7 +393,7 @@ class Simulation:
 
     def _sum_up(self) -> None:
         self._sums.zero_()
-        self._launch(LEDGER, self._workers, [self._arguments[name] for name in LEDGER.takes])
+        self._launch_over_points(LEDGER)
 
     def _expected(self, until: float) -> int:
         """Material points that kernels go over up to a time [s]: what has yet to arrive comes last, and later."""
@@ -390,7 +420,7 @@ class Simulation:
             self._on_launch = names.append
             self._graph = self._captured(self._interval)
             self._on_launch = None
-            self._kernels_of_a_step = tuple(names[1:])  # the first one starts the interval
+            self._kernels_of_a_step = tuple(dict.fromkeys(names[1:]))  # the first one starts the interval
 
     @_one_thread_at_a_time
     def _captured(self, launches: Callable[[], None]) -> Any:
@@ -402,7 +432,8 @@ class Simulation:
 
     @property
     def launched_kernels(self) -> tuple[str, ...]:
-        """Names of the kernels that a step launches, in their order, as captured; the first call compiles them."""
+        """Names of the kernels that a step launches, in their order, as captured; the first call compiles them. Those
+        over points are launched once for each span of points of one material."""
         self.prepare()
         return self._kernels_of_a_step
 
@@ -531,7 +562,7 @@ class Simulation:
             self._fit_velocities(now["position"], solid + liquid, velocity, len(velocity))
         self._point_arrays["stress"].assign(now["effective_stress"])
         if self.effects.liquid:
-            self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._parameters.liquid_bulk_modulus)
+            self._point_arrays["liquid_strain"].assign(-now["pore_pressure"] / self._stiffness_of_liquid())
         clock = self._clock.numpy()
         clock[at.SPEED_MAX] = (velocity.reshape(-1, self.effects.dimensions) ** 2).sum(axis=1).max()
         self._clock.assign(clock)
@@ -662,19 +693,21 @@ class Simulation:
         """
         inside = self._point_arrays["inside"].numpy() == at.INSIDE
         rows = slice(None) if inside.all() else inside
-        material: Any = self.scenario.flow.material
 
         @cache
         def stored(name: str) -> NDArray[np.float64]:
             return self._point_arrays[name].numpy()[rows].astype(np.float64)
 
         def grains() -> NDArray[np.float64]:
-            return (1.0 - material.porosity) * stored("reference_volume")
+            return (1.0 - own("porosity")) * stored("reference_volume")
+
+        def own(name: str) -> NDArray[np.float64]:
+            return self._of_each(name)[rows]
 
         def porosity() -> NDArray[np.float64]:
             if self.effects.porosity_update or self.effects.dilatancy:
                 return np.maximum(1.0 - grains() / stored("volume"), LEAST_POROSITY)
-            return np.full(len(stored("volume")), material.porosity)
+            return own("porosity")
 
         quantities: dict[str, Callable[[], NDArray[np.float64]]] = {
             "position": lambda: stored("position"),
@@ -690,11 +723,20 @@ class Simulation:
             quantities["liquid_velocity"] = lambda: stored("velocity")[:, self.effects.dimensions :]
         if self.effects.liquid:
             quantities["pore_pressure"] = lambda: np.maximum(
-                -material.liquid_bulk_modulus_Pa * stored("liquid_strain"), -material.cavitation_pressure_Pa
+                -own("liquid_bulk_modulus_Pa") * stored("liquid_strain"), -own("cavitation_pressure_Pa")
             )
         shown = quantities if names is None else names
-        own = self.effects.point_fields
-        return {name: stored(name) if name in own else quantities[name]() for name in shown}
+        kept = self.effects.point_fields
+        return {name: stored(name) if name in kept else quantities[name]() for name in shown}
+
+    def _stiffness_of_liquid(self) -> NDArray[np.float64]:
+        """Bulk modulus of each point's liquid [N] [Pa]; infinite where there is none, which bears no pressure."""
+        modulus = self._of_each("liquid_bulk_modulus_Pa")
+        return np.where(modulus > 0.0, modulus, math.inf)
+
+    def _of_each(self, name: str) -> NDArray[np.float64]:
+        """A field of each point's material [N]; 0 where that has none."""
+        return np.array([getattr(own, name, 0.0) for own in self.scenario.flow.materials])[self._material]
 
     def window(self) -> Window:
         """A mark of the present time, since which `sample` can tell mean forces. It belongs to the caller.
@@ -814,7 +856,7 @@ class Simulation:
         }
 
     def _state_arrays(self) -> dict[str, Any]:
-        arrays = {f"points.{name}": array for name, array in self._point_arrays.items() if name != "materials"}
+        arrays = {f"points.{name}": array for name, array in self._point_arrays.items()}
         # Corner sums and the rest of the grid are rebuilt every step; only the blocks in use are remembered.
         arrays |= {
             "clock": self._clock,

@@ -155,24 +155,19 @@ def nominal_step(scenario: Scenario) -> float:
 
 def step_limits(scenario: Scenario) -> StepLimits:
     """Bounds on the time step of `scenario` (audit, section 3.4), with several materials the closest; the speed of
-    sound is that of the flow's.
+    sound is that of the flow's, or in a wet scene of a dry flow that of the first wet one.
 
     Raises:
         ValueError: sound through a material has no finite speed.
     """
-    flow = scenario.flow
-    limits, *others = (
-        _limits(scenario.model_copy(update={"flow": flow.model_copy(update={"material": material})}))
-        for material in flow.materials
+    materials = scenario.flow.materials
+    limits = [_limits(scenario.of_material(place)) for place in range(len(materials))]
+    return StepLimits(
+        max(one.wave_speed for one in limits),
+        limits[materials.index(scenario.flow.wettest)].sound_speed,
+        min(one.drag_step for one in limits),
+        min(one.law_step for one in limits),
     )
-    for other in others:
-        limits = StepLimits(
-            max(limits.wave_speed, other.wave_speed),
-            limits.sound_speed,
-            min(limits.drag_step, other.drag_step),
-            min(limits.law_step, other.law_step),
-        )
-    return limits
 
 
 def _limits(scenario: Scenario) -> StepLimits:

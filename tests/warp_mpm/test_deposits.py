@@ -62,9 +62,24 @@ def test_volumes_tell_the_flow_from_its_deposits():
         ([{"shape": HEAP["shape"] | {"to_m": 2}}], r"flow.deposits\[0\] lies inside the barrier by"),
         ([HEAP, HEAP], r"flow.deposits\[0\] and flow.deposits\[1\] lie in one place; they must not overlap"),
         (
-            [HEAP | {"material": {"porosity": 0.3}}],
-            r"deposits\[0\].material.porosity is not allowed; a deposit may diff",
+            [HEAP | {"material": {"porosty": 0.3}}],
+            r'deposits\[0\].material.porosty is not allowed; a material with the formulation "two_phase" and the law',
         ),
+        (
+            [HEAP | {"formulation": "dry", "material": {"liquid_density_kg_per_m3": 900}}],
+            r'deposits\[0\].material.liquid_density_kg_per_m3 is not allowed; a material with the formulation "dry"',
+        ),
+        (
+            [HEAP | {"formulation": "undrained"}],
+            r'deposits\[0\].formulation = "undrained" is not allowed, .* it must be "two_phase" or "dry"',
+        ),
+        (
+            [HEAP | {"material": {"porosity_update": True}}],
+            r"deposits\[0\].material.porosity_update = true is not allowed, .* it must be false",
+        ),
+        ([HEAP | {"material": {"law": "mud"}}], r'deposits\[0\].material.law = "mud" is not known; it must be one of'),
+        ([HEAP | {"material": {"law": "mu_i"}}], r"deposits\[0\].material: .*is missing"),
+        ([HEAP | {"material": {"porosity": 1.4}}], r"deposits\[0\].material: porosity = 1.4 is not allowed"),
         ([HEAP | {"material": {"poisson_ratio": 0.6}}], r"deposits\[0\].material: poisson_ratio = 0.6 is not allowed"),
         ([HEAP | {"material": {"dilatancy_angle_deg": 30}}], r"deposits\[0\].material: .*must not exceed"),
     ],
@@ -75,10 +90,9 @@ def test_what_is_no_deposit_gets_one_sentence(deposits, sentence):
     assert len(refused.value.problems) == 1
 
 
-def test_only_a_deposit_of_its_own_material_calls_for_the_effect():
+def test_a_deposit_of_its_own_skeleton_calls_for_no_other_kernels():
     plain, own = (scene(LATE, **{"flow.deposits": [HEAP | more]}) for more in ({}, {"material": {"cohesion_Pa": 1e3}}))
-    assert not derive_effects(plain).materials
-    assert derive_effects(own).materials
+    assert derive_effects(own) == derive_effects(plain)
     assert [material.cohesion_Pa for material in own.flow.materials] == [0.0, 1e3]
     # The stiffest bounds the step; K0 is that of the deposit's own law.
     stiff = scene(LATE, **{"flow.deposits": [HEAP | {"material": {"young_modulus_Pa": 2e8, "friction_angle_deg": 40}}]})
@@ -94,7 +108,6 @@ def test_each_deposit_slumps_as_its_own_material_does():
     lateral = {"lateral_stress_coefficient": 0.66}
     heaps = [HEAP | lateral | {"material": {"friction_angle_deg": 40}}, OTHER | lateral]
     both = Simulation(scene(LATE, **{"flow.deposits": heaps}))
-    assert both.effects.materials
     alike = [HEAP | lateral, OTHER | lateral]
     strong = Simulation(scene(LATE, **{"flow.deposits": alike, "flow.material.friction_angle_deg": 40}))
     weak = Simulation(scene(LATE, **{"flow.deposits": alike}))

@@ -30,28 +30,9 @@ from .layout import (
 )
 
 
-def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, module: str) -> SimpleNamespace:
-    """Build the kernels `convey` (one thread) and `hold` (over points).
-
-    What arrives rides on a conveyor: drawn upstream of the section as it will pass there, it moves at the velocity that
-    the table gives for the time. In its last cells, the approach, a point is seen by the nodes; whatever velocity they
-    give it is taken from it again, with the stress that it began with. So the section has a full neighbourhood
-    upstream, which pushes as the flow that arrives would. At the section the point is let go.
-
-    Args:
-        types: of the kernels.
-        pore: functions of the pore pressure.
-        rest: function of a point that makes it one at rest to `update`.
-        module: name of the Warp module.
-    """
-    effects = types.effects
-    F, V2, V, S = types.scalar, types.V2, types.V, types.S
-    Points, Grid, Parameters, Arrival, Book = types.Points, types.Grid, types.Parameters, types.Arrival, types.Book
-    elementary = make_elementary(types)
-    read, write = elementary.read, elementary.write
-    TWO_PHASE = effects.two_phase
-    RELAXATION = effects.pressure_relaxation
-    halt, pressure_at = types.scheme.halt, pore.pressure
+def make_conveyor(types: SimpleNamespace, module: str) -> Any:
+    """Build the kernel `convey` (one thread)."""
+    Arrival, Book = types.Arrival, types.Book
 
     @wp.kernel(module=module)
     def convey(arrival: Arrival, book: Book):
@@ -84,6 +65,35 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         if time < arrival.times[last]:
             fastest = arrival.fastest * arrival.fastest
             book.clock[wp.static(SPEED_MAX)] = wp.max(book.clock[wp.static(SPEED_MAX)], fastest)
+
+    return convey
+
+
+def make_arrival(
+    types: SimpleNamespace, vectors: SimpleNamespace, pore: SimpleNamespace, rest: Any, module: str
+) -> Any:
+    """Build the kernel `hold` (over points).
+
+    What arrives rides on a conveyor: drawn upstream of the section as it will pass there, it moves at the velocity that
+    the table gives for the time. In its last cells, the approach, a point is seen by the nodes; whatever velocity they
+    give it is taken from it again, with the stress that it began with. So the section has a full neighbourhood
+    upstream, which pushes as the flow that arrives would. At the section the point is let go.
+
+    Args:
+        types: of the kernels.
+        vectors: functions that take vectors apart.
+        pore: functions of the pore pressure.
+        rest: function of a point that makes it one at rest to `update`.
+        module: name of the Warp module.
+    """
+    effects = types.effects
+    F, V2, S = types.scalar, types.V2, types.S
+    Points, Grid, Parameters, Arrival, Book = types.Points, types.Grid, types.Parameters, types.Arrival, types.Book
+    elementary = make_elementary(types)
+    read, write = elementary.read, elementary.write
+    TWO_PHASE = effects.two_phase
+    RELAXATION = effects.pressure_relaxation
+    halt, pressure_at, of_phases = types.scheme.halt, pore.pressure, vectors.of_phases
 
     @wp.func
     def prescribed(x: wp.float64, y: wp.float64, speed: wp.float64, stretch: wp.float64, arrival: Arrival) -> V2:
@@ -171,12 +181,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         speed = pace * arrival.conveyed[wp.static(CONVEYED_SPEED)]
         stretch = arrival.conveyed[wp.static(CONVEYED_STRETCH)]
         v = prescribed(wp.float64(place[0]), wp.float64(place[1]), speed, stretch, arrival)
-        velocity = V()
-        if TWO_PHASE:
-            velocity = V(v[0], v[1], v[0], v[1])
-        else:
-            velocity = V(v[0], v[1])
-        write(points.velocity, p, velocity)
+        write(points.velocity, p, of_phases(v, v))
         write(points.position, p, place)
         rest(points, p)
         if RELAXATION:
@@ -189,4 +194,4 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         if at >= arrival.section:
             let_go(points, p, place, v, parameters, arrival, book)
 
-    return SimpleNamespace(convey=convey, hold=hold)
+    return hold

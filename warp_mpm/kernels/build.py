@@ -13,6 +13,7 @@ from ..effects import Effects
 from ..simulator.bodies.kernels import make_body_functions
 from ..simulator.laws.law import all_functions as law_functions
 from ..simulator.schemes.scheme import all_functions as scheme_functions
+from .arrival import make_conveyor
 from .clock import make_clock
 from .constitutive import make_constitutive
 from .contact import make_contact
@@ -20,6 +21,7 @@ from .elementary import make_elementary
 from .grid_momentum import make_grid_momentum
 from .layout import layout
 from .ledger import make_ledger
+from .nodes import make_nodes
 from .pore_pressure import make_pore_pressure
 from .seepage import make_seepage
 from .shape_functions import make_shape_functions
@@ -40,7 +42,11 @@ CHECKED = os.environ.get("WARP_MPM_CHECKED", "") not in ("", "0")
 
 @cache
 def build_kernels(effects: Effects) -> SimpleNamespace:
-    """Kernels for `effects`, and no others, in a Warp module of their own."""
+    """Kernels for `effects`, and no others, in a Warp module of their own.
+
+    Those over points stand in `of_kinds`, a namespace for each kind of material; those of the first, or only, one are
+    among the others too.
+    """
     module = effects.module_name
     options: dict[str, Any] = {
         "enable_backward": False,
@@ -52,26 +58,38 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     wp.set_module_options(options, module=wp.get_module(module))
     types = layout(effects)
     shapes = make_shape_functions(types)
-    pore = make_pore_pressure(types)
     elementary = make_elementary(types)
     vectors = make_vectors(types)
     tools = SimpleNamespace(**elementary.__dict__, **shapes.__dict__, **vectors.__dict__)
     types.scheme = SimpleNamespace(**scheme_functions(effects.scheme, types, tools))
-    types.law = SimpleNamespace(**law_functions(effects.skeleton, types, tools))
     bodies = make_body_functions(types, elementary) if effects.bodies else None
-    transfer = make_transfer(types, shapes, vectors, pore, bodies, module)
-    constitutive = make_constitutive(types, shapes, vectors, pore, bodies, module)
+    of_scheme = effects.scheme.kernels(types, tools, module)
+    of_kinds = []
+    for of_kind in effects.of_kinds:
+        # The same structures for all kinds of material; what the kernels do with them is their own.
+        own = SimpleNamespace(**types.__dict__ | {"effects": of_kind})
+        own.law = SimpleNamespace(**law_functions(of_kind.skeleton, own, tools))
+        pore = make_pore_pressure(own)
+        of_kinds.append(
+            SimpleNamespace(
+                **make_transfer(own, shapes, vectors, pore, bodies, module).__dict__,
+                **make_constitutive(own, shapes, vectors, pore, bodies, module).__dict__,
+                ledger=make_ledger(own, vectors, pore, module).ledger,
+                **of_scheme,
+            )
+        )
     clock = make_clock(types, bodies, module)
     kernels = SimpleNamespace(
         types=types,
+        of_kinds=of_kinds,
+        **of_kinds[0].__dict__,
+        **make_nodes(types, module).__dict__,
         move=make_grid_momentum(types, vectors, module).move,
-        **transfer.__dict__,
-        **constitutive.__dict__,
         start=clock.start,
         tick=clock.tick,
-        ledger=make_ledger(types, vectors, pore, module).ledger,
-        **effects.scheme.kernels(types, tools, module),
     )
+    if effects.arriving:
+        kernels.convey = make_conveyor(types, module)
     if effects.two_phase:
         kernels.seep = make_seepage(types, vectors, module).seep
     if effects.bodies:

@@ -82,8 +82,9 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
-    MATERIALS = effects.materials
-    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
+    PARTLY_DRY = types.partly_dry
+    WET = S._length_ - 1
+    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields and TWO_PHASE
     SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
 
@@ -179,7 +180,11 @@ def make_constitutive(
                             share *= hz[q]
                         corner = read(grid.corner, place)
                         smooth += share * corner
-                        least_filling = smaller(corner[0], least_filling)
+                        if PARTLY_DRY:
+                            # Beside what is dry the liquid has a free surface.
+                            least_filling = smaller(corner[wp.static(WET)], least_filling)
+                        else:
+                            least_filling = smaller(corner[0], least_filling)
             if RELAXATION:
                 # With the part that was left out of the average.
                 smooth[2] += parameters.true_liquid_density * wp.dot(parameters.gravity, x)
@@ -262,8 +267,6 @@ def make_constitutive(
         Points that have left pass through as well, as `leave` has made them: at rest, so that nothing changes.
         """
         p = wp.tid()
-        if MATERIALS:
-            parameters = points.materials[read(points.material, p)]
         time_step = F(clock[wp.static(TIME_STEP)])
         gradient = read(points.gradient, p)
         divergence = trace(gradient)
@@ -358,15 +361,13 @@ def make_constitutive(
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
     if effects.arriving:
-        kernels.__dict__.update(make_arrival(types, pore, rest, module).__dict__)
+        kernels.hold = make_arrival(types, vectors, pore, rest, module)
     if not AT_ONCE:
 
         @wp.kernel(module=module)
         def yielding(points: Points, parameters: Parameters, book: Book):
             """What `update` leaves to a law that the compiler cannot turn into vector instructions."""
             p = wp.tid()
-            if MATERIALS:
-                parameters = points.materials[read(points.material, p)]
             gap = F(0.0)
             if OPENS:
                 gap = read(points.solid_gap, p)

@@ -41,6 +41,9 @@ NODES = {2: 9, 3: 27}
 """Around a place, by the number of dimensions, counted column by column. A loop of more than three rounds is not
 written out: contact is half of what there is to compile, and a small share of a step."""
 
+WEIGHTLESS = 1e-30
+"""Of a ratio of masses, in place of nil."""
+
 REACHED = 0.75
 """Share of a place's weights that must lie on nodes with mass before the flow counts as there: more than the half that
 lies on the nodes before the surface, which a flow has that is still to come. From 0.6 to 0.9 case 1 at 0.2 m slides as
@@ -71,7 +74,7 @@ def make_contact(
     CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     elementary = make_elementary(types)
-    read, write = elementary.read, elementary.write
+    read, write, larger = elementary.read, elementary.write, elementary.larger
     weights, cell_of = shapes.weights, shapes.cell_of
     displaced, look_ahead = bodies_of.displaced, bodies_of.look_ahead
     of_phases, solid_of, liquid_of = vectors.of_phases, vectors.solid_of, vectors.liquid_of
@@ -79,6 +82,7 @@ def make_contact(
     DIMENSIONS = types.dimensions
     SPATIAL = DIMENSIONS == 3
     AROUND = NODES[DIMENSIONS]
+    MATERIALS = effects.materials
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
@@ -99,6 +103,10 @@ def make_contact(
         wy = contact.weight_y[e]
         result = F(0.0)
         total = F(0.0)
+        if MATERIALS:
+            liquid_mass = F(0.0)
+            drag = F(0.0)
+            filling = F(0.0)
         for k in range(AROUND):
             w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
@@ -106,6 +114,22 @@ def make_contact(
                 if mass > F(0.0):
                     result += w * w / mass
                     total += w
+                    if MATERIALS:
+                        if TWO_PHASE:
+                            liquid_mass += w * read(grid.liquid_mass, node) / mass
+                            drag += w * read(grid.drag, node) / mass
+                        if CARRIED:
+                            filling += w * read(grid.filling, node) / mass
+        if MATERIALS:
+            # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
+            # weighs next to nothing stands in for it.
+            inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
+            if TWO_PHASE:
+                contact.liquid_ratio[e] = larger(liquid_mass * inverse_total, F(wp.static(WEIGHTLESS)))
+                if FRICTION:
+                    contact.drag_per_mass[e] = drag * inverse_total
+            if CARRIED:
+                contact.filling_ratio[e] = larger(filling * inverse_total, F(wp.static(WEIGHTLESS)))
         if total < F(wp.static(REACHED)):
             result = F(0.0)
         elif contact.fixed[e] == 0:
@@ -172,12 +196,33 @@ def make_contact(
                     write(grid.liquid_alone, node, read(grid.liquid_alone, node) + (w / mass) * impulse)
 
     @wp.func
-    def drag_share(parameters: Parameters, time_step: F) -> F:
+    def liquid_ratio(contact: Contact, e: wp.int32, parameters: Parameters) -> F:
+        """Mass of liquid over that of the solid at the place."""
+        if MATERIALS:
+            result = contact.liquid_ratio[e]
+        else:
+            result = parameters.liquid_ratio
+        return result
+
+    @wp.func
+    def filling_ratio(contact: Contact, e: wp.int32, parameters: Parameters) -> F:
+        """Mass of liquid that would fill the whole volume over that of the solid, at the place."""
+        if MATERIALS:
+            result = contact.filling_ratio[e]
+        else:
+            result = parameters.filling_ratio
+        return result
+
+    @wp.func
+    def drag_share(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> F:
         """Share of the solid's change of velocity that drag passes on to the liquid within the step."""
         share = F(0.0)
         if IMPLICIT_DRAG:
-            drag = parameters.drag_per_mass * time_step
-            share = drag / (parameters.liquid_ratio + drag)
+            if MATERIALS:
+                drag = contact.drag_per_mass[e] * time_step
+            else:
+                drag = parameters.drag_per_mass * time_step
+            share = drag / (liquid_ratio(contact, e, parameters) + drag)
         return share
 
     @wp.func
@@ -187,10 +232,10 @@ def make_contact(
         solid = contact.solid[e] * n
         liquid = X()
         if TWO_PHASE:
-            liquid = (contact.liquid[e] / parameters.liquid_ratio) * n
+            liquid = (contact.liquid[e] / liquid_ratio(contact, e, parameters)) * n
             if FRICTION:
-                share = drag_share(parameters, time_step)
-                rub = contact.rubbed[e] / (F(1.0) + parameters.liquid_ratio * share)
+                share = drag_share(contact, e, parameters, time_step)
+                rub = contact.rubbed[e] / (F(1.0) + liquid_ratio(contact, e, parameters) * share)
                 solid += along(rub, n)
                 liquid += along(share * rub, n)
         else:
@@ -338,13 +383,14 @@ def make_contact(
         if TWO_PHASE:
             liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
-            liquid_inverse = inverse / parameters.liquid_ratio
+            ratio = liquid_ratio(contact, e, parameters)
+            liquid_inverse = inverse / ratio
             old_liquid = contact.liquid[e]
             new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
             contact.liquid[e] = new_liquid
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
-            liquid_given = (liquid_change / parameters.liquid_ratio) * n
+            liquid_given = (liquid_change / ratio) * n
         if FRICTION:
             friction = bodies.friction[contact.surface[e]]
             rubs = friction > F(0.0)
@@ -353,11 +399,12 @@ def make_contact(
             if rubs:
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
-                    alone_inverse = inverse / parameters.filling_ratio
+                    filling = filling_ratio(contact, e, parameters)
+                    alone_inverse = inverse / filling
                     old_alone = contact.alone[e]
                     new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
                     contact.alone[e] = new_alone
-                    change_alone = (new_alone - old_alone) / parameters.filling_ratio
+                    change_alone = (new_alone - old_alone) / filling
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
                     effective(contact, contact.before[e]) + effective(contact, contact.after[e])
                 )
@@ -365,8 +412,8 @@ def make_contact(
                 inertia = F(1.0)
                 share = F(0.0)
                 if TWO_PHASE:
-                    share = drag_share(parameters, time_step)
-                    inertia += parameters.liquid_ratio * share
+                    share = drag_share(contact, e, parameters, time_step)
+                    inertia += ratio * share
                 slip = slip_along(solid_velocity, n)
                 old_rub = contact.rubbed[e]
                 mobility = inverse / inertia + give_way_along
@@ -531,7 +578,7 @@ def make_contact(
                 if contact.inverse[e] > F(0.0):
                     give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
                     if CARRIED:
-                        alone = contact.alone[e] / parameters.filling_ratio
+                        alone = contact.alone[e] / filling_ratio(contact, e, parameters)
                         give_alone(contact, e, alone * contact.normal[e], grid, parameters)
                     react(bodies, contact.body[e], on_body(contact, e))
             meet()

@@ -18,8 +18,10 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     INERTIAL_DRAG = effects.inertial_drag
+    MATERIALS = "liquid_mass" in types.grid_fields
     POROSITY = effects.porosity_update
     BEYOND = "drag_beyond" in types.grid_fields
+    LIQUID = types.dimensions  # the first of the liquid's entries in a V
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
     per_phase, of_phases = vectors.per_phase, vectors.of_phases
@@ -35,21 +37,25 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
         return per_phase(solid, liquid)
 
     @wp.func
-    def dragged(free: V, coefficient: F, beyond: F, parameters: Parameters, time_step: F) -> V:
+    def per_masses(mass: F, liquid_mass: F) -> V:
+        """The same where the nodes have the mass of each phase; 0 for a liquid that is not there."""
+        return per_phase(F(1.0) / mass, wp.where(liquid_mass > F(0.0), F(1.0) / liquid_mass, F(0.0)))
+
+    @wp.func
+    def dragged(free: V, ratio: F, rate: F, rate_beyond: F, time_step: F) -> V:
         """Exchange momentum between the phases, after their own forces. Per node and direction the two unknowns
         decouple into the mixture's velocity, which drag leaves alone, and w = v_L - v_S, which decays at the rate
         Q (1 / n_S rho_S + 1 / n rho_L): over the step by a factor of 1 / (1 + rate dt), explicitly of 1 - rate dt.
-        `coefficient` is Q over its value at the initial porosity, that is n² over its value there, and over that of
-        the conductivity where this follows. `beyond` is the same of the drag that follows.
+        `ratio` is the mass of the liquid over that of the solid, `rate` that of the decay [1/s].
 
         With drag b |w| w besides (Forchheimer), |w| at the end of the step obeys |w| (1 + (rate + b |w|) dt) = |w|
-        before."""
-        solid_share = F(1.0) / (F(1.0) + parameters.liquid_ratio)
-        liquid_share = parameters.liquid_ratio * solid_share
-        lost = coefficient * parameters.drag_rate * time_step
+        before; `rate_beyond` is b [1/m]."""
+        solid_share = F(1.0) / (F(1.0) + ratio)
+        liquid_share = ratio * solid_share
+        lost = rate * time_step
         slip = liquid_of(free) - solid_of(free)
         if INERTIAL_DRAG:
-            growth = beyond * parameters.inertial_drag_rate * time_step
+            growth = rate_beyond * time_step
             growth *= F(4.0) * wp.sqrt(wp.dot(slip, slip))
             linear = F(1.0) + lost
             lost += growth / (linear + wp.sqrt(linear * linear + growth)) * F(0.5)
@@ -73,7 +79,11 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
-                    inverse = per_mass(mass, parameters)
+                    if MATERIALS:
+                        liquid_mass = grid.liquid_mass[i, j]
+                        inverse = per_masses(mass, liquid_mass)
+                    else:
+                        inverse = per_mass(mass, parameters)
                     old = wp.cw_mul(inverse, grid.velocity[i, j])
                     new = free_velocity(grid, i, j, inverse, gravity, time_step)
                     if LIQUID_ALONE:
@@ -81,7 +91,19 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                             grid.liquid_alone[i, j] = liquid_of(new)
                         else:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
-                    if TWO_PHASE:
+                    if MATERIALS:
+                        # Drag of the node [kg/s] over the mass of each phase; without liquid there is none.
+                        both = inverse[0] + inverse[wp.static(LIQUID)]
+                        beyond = F(0.0)
+                        if INERTIAL_DRAG:
+                            beyond = grid.drag_beyond[i, j] * both
+                        new = dragged(new, liquid_mass / mass, grid.drag[i, j] * both, beyond, time_step)
+                        if liquid_mass == F(0.0):
+                            # What has no mass goes with the solid, for whom it concerns.
+                            old = of_phases(solid_of(old), solid_of(old))
+                            new = of_phases(solid_of(new), solid_of(new))
+                    elif TWO_PHASE:
+                        # Over the values at the start: n², and over that of the conductivity where it follows.
                         coefficient = F(1.0)
                         beyond = F(1.0)
                         if POROSITY:
@@ -90,7 +112,11 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                                 beyond = coefficient * wp.sqrt(coefficient)  # n³
                         if BEYOND:
                             beyond = grid.drag_beyond[i, j] / mass
-                        new = dragged(new, coefficient, beyond, parameters, time_step)
+                        rate = coefficient * parameters.drag_rate
+                        rate_beyond = F(0.0)
+                        if INERTIAL_DRAG:
+                            rate_beyond = beyond * parameters.inertial_drag_rate
+                        new = dragged(new, parameters.liquid_ratio, rate, rate_beyond, time_step)
                     grid.velocity[i, j] = new
                     keep(grid, i, j, old, new, time_step, parameters)
 

@@ -188,10 +188,13 @@ def layout(effects: Effects) -> SimpleNamespace:
     G = wp.types.vector(dimensions**2, scalar)
     R = scalar if dimensions == 2 else X
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
-    S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
+    # Where some points are dry, the volume of the others last; the liquid's sums are then over those.
+    sums = {"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation]
+    S = wp.types.vector(sums + 1 if effects.partly_dry else sums, scalar)
     P = wp.types.vector(PIECE, scalar)
     array = wp.array
     types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
+    types.partly_dry = effects.partly_dry
     types.dimensions, types.X, types.X64, types.T, types.G, types.R = dimensions, X, X64, T, G, R
 
     points: dict[str, Any] = {
@@ -204,9 +207,9 @@ def layout(effects: Effects) -> SimpleNamespace:
         "gradient": array(dtype=G),
         "inside": array(dtype=wp.int32),
     }
-    if effects.skeleton.opens:
+    if any(law.opens for law in effects.laws):
         points["solid_gap"] = array(dtype=scalar)
-    if effects.skeleton.extra_stress:
+    if any(law.extra_stress for law in effects.laws):
         points["extra_stress"] = array(dtype=T)
     if effects.liquid:
         points["liquid_strain"] = array(dtype=scalar)
@@ -235,10 +238,17 @@ def layout(effects: Effects) -> SimpleNamespace:
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
     }
-    if effects.porosity_update:
+    if effects.materials and effects.two_phase:
+        grid["liquid_mass"] = array(dtype=scalar, ndim=2)  # [kg/m]
+        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient Q, times volume [kg/(m s)]
+        if effects.inertial_drag:
+            grid["drag_beyond"] = array(dtype=scalar, ndim=2)  # the same of the drag with the square of the slip
+    elif effects.porosity_update:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
         if effects.inertial_drag and effects.conductivity != "constant":
             grid["drag_beyond"] = array(dtype=scalar, ndim=2)  # the same of the drag with the square of the slip
+    if effects.materials and effects.liquid_alone:
+        grid["filling"] = array(dtype=scalar, ndim=2)  # mass of liquid that would fill the whole volume [kg/m]
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it. Contact reads nodes without mass too:
@@ -278,7 +288,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     }
     if dimensions == 3:
         parameters |= {"front": scalar, "layers": wp.int32, "layer": wp.int32}  # z [m]; layers, and nodes of each
-    parameters |= dict.fromkeys((*effects.skeleton.constants, *effects.scheme.constants), scalar)
+    of_laws = [name for law in effects.laws for name in law.constants]
+    parameters |= dict.fromkeys((*of_laws, *effects.scheme.constants), scalar)
     if effects.dilatancy:
         parameters |= dict.fromkeys(DILATANCY_CONSTANTS, scalar)
     if effects.density_correction:
@@ -327,9 +338,6 @@ def layout(effects: Effects) -> SimpleNamespace:
         }
         types.Arrival = _structure("Arrival", arrival)
     types.Parameters = _structure("Parameters", parameters)
-    if effects.materials:
-        points["material"] = array(dtype=wp.int32)  # place in the next
-        points["materials"] = array(dtype=types.Parameters)
     types.Points = _structure("Points", points)
     types.Grid = _structure("Grid", grid)
     types.Bodies = _structure("Bodies", bodies)

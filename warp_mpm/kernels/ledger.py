@@ -40,7 +40,6 @@ def make_ledger(
     RELAXATION = effects.pressure_relaxation
     BODIES = effects.bodies
     MOVING = effects.moving
-    MATERIALS = effects.materials
     Bodies = types.Bodies
     Book = types.Book
     X64 = types.X64
@@ -116,11 +115,7 @@ def make_ledger(
                     liquid_mass += wp.float64(liquid)
                 s = read(points.stress, p)
                 grains = parameters.grain_share * reference
-                if MATERIALS:
-                    own = points.materials[read(points.material, p)]
-                    elastic_energy += stored_in_skeleton(s, volume, grains, own)
-                else:
-                    elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
+                elastic_energy += stored_in_skeleton(s, volume, grains, parameters)
                 # Not negative, any of them, so that what is not finite in one shows in the sum.
                 sound = squares(s) + volume + kinetic
                 if LIQUID:

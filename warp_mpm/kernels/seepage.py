@@ -14,6 +14,7 @@ def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) 
     Parameters = types.Parameters
     Book = types.Book
     X64 = types.X64
+    MATERIALS = "liquid_mass" in types.grid_fields
     solid_of, liquid_of, wide = vectors.solid_of, vectors.liquid_of, vectors.wide
 
     @wp.kernel(module=module)
@@ -31,7 +32,10 @@ def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) 
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
                     v = grid.velocity[i, j]
-                    liquid = mass * parameters.liquid_ratio
+                    if MATERIALS:
+                        liquid = grid.liquid_mass[i, j]
+                    else:
+                        liquid = mass * parameters.liquid_ratio
                     slip += wide(liquid * (liquid_of(v) - solid_of(v)))
         wp.atomic_add(book.balance, wp.static(SEEPAGE_POWER), wp.dot(wide(parameters.gravity), slip))
 

@@ -1,4 +1,4 @@
-"""Transfer between material points and grid: clear, scatter (points to grid), gather (grid to points)."""
+"""Transfer between material points and grid: scatter (points to grid), gather (grid to points)."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +8,6 @@ import warp as wp
 from ..simulator.bodies.kernels import RUBBED, RUBS
 from .elementary import make_elementary
 from .layout import (
-    BLOCK,
     BLOCK_SHIFT,
     SPEED_MAX,
     TIME_STEP,
@@ -26,13 +25,12 @@ def make_transfer(
     bodies_of: Any,
     module: str,
 ) -> SimpleNamespace:
-    """Build the kernels `clear` (workers on the blocks in use), `forget`, `scatter` and `gather` (over points)."""
+    """Build the kernels `scatter` and `gather` (over points)."""
     effects = types.effects
     F = types.scalar
     V2 = types.V2
     V3 = types.V3
     V = types.V
-    X = types.X
     S = types.S
     Points = types.Points
     Grid = types.Grid
@@ -46,6 +44,7 @@ def make_transfer(
     face_x, face_y, face_z = vectors.face_x, vectors.face_y, vectors.face_z
     trace, shear_rate, midway, section = vectors.trace, vectors.shear_rate, vectors.midway, vectors.section
     speed_squared = vectors.speed_squared
+    WET = S._length_ - 1
     SPATIAL = types.dimensions == 3
     LAYERS, CORNER_LAYERS = (3, 2) if SPATIAL else (1, 1)
     elementary = make_elementary(types)
@@ -54,13 +53,7 @@ def make_transfer(
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     scheme = types.scheme
-    empty, start, column, deposit, collect = (
-        scheme.clear,
-        scheme.start,
-        scheme.column,
-        scheme.deposit,
-        scheme.collect,
-    )
+    start, column, deposit, collect = scheme.start, scheme.column, scheme.deposit, scheme.collect
     force_share, impulse_share = scheme.force_share, scheme.impulse_share
     start_across, collect_in_space = scheme.start_across, scheme.collect_in_space
     CORNERS = effects.smoothing_grid
@@ -81,40 +74,16 @@ def make_transfer(
     POROSITY = effects.porosity_update
     CONDUCTIVITY = effects.conductivity != "constant"
     BEYOND = "drag_beyond" in types.grid_fields
+    # Dry points in a scene that is wet elsewhere bring no liquid, and so none of these.
+    PARTLY_DRY = types.partly_dry
+    DRY = PARTLY_DRY and not LIQUID
+    DRAG = "drag" in types.grid_fields and TWO_PHASE
+    OF_MATERIAL = "liquid_mass" in types.grid_fields and TWO_PHASE
+    FILLING = "filling" in types.grid_fields and LIQUID
     resistance = pore.resistance
-    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields
+    OWN_DIVERGENCE = "liquid_divergence" in types.point_fields and TWO_PHASE
     pressure_at = pore.pressure
     porosity = pore.porosity
-
-    @wp.kernel(module=module)
-    def clear(grid: Grid, parameters: Parameters):
-        """Empty the nodes of the blocks that were in use. A block's mark is its place in the list of active blocks,
-        counted from one; zero when it is not in use."""
-        worker = wp.tid()
-        for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
-            block = grid.active[s / wp.static(BLOCK)]
-            bi = block / parameters.block_rows
-            bj = block - bi * parameters.block_rows
-            i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
-            grid.block[bi, bj] = 0
-            for b in range(wp.static(BLOCK)):
-                j = bj * wp.static(BLOCK) + b
-                grid.mass[i, j] = F(0.0)
-                grid.velocity[i, j] = V()
-                empty(grid, i, j)
-                if LIQUID_ALONE:
-                    grid.liquid_alone[i, j] = X()
-                if POROSITY:
-                    grid.drag[i, j] = F(0.0)
-                    if BEYOND:
-                        grid.drag_beyond[i, j] = F(0.0)
-                if CORNERS:
-                    grid.corner[i, j] = S()
-
-    @wp.kernel(module=module)
-    def forget(grid: Grid):
-        """Forget the list of active blocks, once they are empty."""
-        grid.active_count[0] = 0
 
     @wp.func
     def mark(grid: Grid, block: wp.int32, parameters: Parameters):
@@ -201,6 +170,21 @@ def make_transfer(
         # Force on a node: force_x times the weight's slope (per cell) along x, plus force_y times that along y, ...
         force_x = of_phases(face_x(stress, solid_pressure, push), on_x(liquid_force))
         force_y = of_phases(face_y(stress, solid_pressure, push), on_y(liquid_force))
+        if OF_MATERIAL:
+            # Per mass of the solid; the two rates are per mass of both phases, one over the other.
+            dragging = parameters.drag_per_mass
+            if BEYOND:
+                dragging_beyond = parameters.inertial_drag_rate
+                dragging_beyond *= parameters.liquid_ratio / (F(1.0) + parameters.liquid_ratio)
+            if POROSITY:
+                ratio = n / parameters.porosity
+                dragging *= ratio * ratio
+                if CONDUCTIVITY:
+                    dragging *= resisting
+                if BEYOND:
+                    dragging_beyond *= ratio * ratio * ratio
+                    if CONDUCTIVITY:
+                        dragging_beyond *= wp.sqrt(resisting)
         momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
@@ -239,7 +223,15 @@ def make_transfer(
                 for m in range(3):
                     node = layer + k * parameters.rows + m
                     add(grid.mass, node, wy[m] * column_mass)
-                    if POROSITY:
+                    if FILLING:
+                        add(grid.filling, node, wy[m] * column_mass * parameters.filling_ratio)
+                    if OF_MATERIAL:
+                        share = wy[m] * column_mass
+                        add(grid.liquid_mass, node, share * parameters.liquid_ratio)
+                        add(grid.drag, node, share * dragging)
+                        if BEYOND:
+                            add(grid.drag_beyond, node, share * dragging_beyond)
+                    elif DRAG:
                         # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that changes.
                         ratio = n / parameters.porosity
                         if CONDUCTIVITY:
@@ -369,6 +361,10 @@ def make_transfer(
             lean_y += (F(0.5) - fy) * smooth
             velocity = collect(points, p, grid, first, wx, wy, smooth, lean_x, lean_y, time_step, parameters)
             gradient, liquid_divergence = midway(along_x, along_y, time_step)
+        if DRY:
+            # It has no liquid; what the nodes have of it is another material's.
+            velocity = of_phases(solid_of(velocity), solid_of(velocity))
+            write(points.velocity, p, velocity)
         fastest = wp.float64(speed_squared(velocity))
         # Few points are the fastest so far, and a load is cheaper than a store that the next point waits for.
         if fastest > book.clock[wp.static(SPEED_MAX)]:
@@ -410,7 +406,18 @@ def make_transfer(
                         if SPATIAL:
                             h *= hz[q]
                             corner += q * parameters.layer
-                        if TWO_PHASE:
+                        if PARTLY_DRY:
+                            sums = S()
+                            sums[0] = h
+                            sums[1] = h * divergence
+                            if LIQUID:
+                                sums[2] = h * excess
+                                sums[3] = h * residual
+                                if TWO_PHASE:
+                                    sums[4] = h * liquid_divergence
+                                sums[wp.static(WET)] = h
+                            add(grid.corner, corner, sums)
+                        elif TWO_PHASE:
                             sums = S(h, h * divergence, h * excess, h * residual, h * liquid_divergence)
                             add(grid.corner, corner, sums)
                         elif LIQUID:
@@ -418,31 +425,4 @@ def make_transfer(
                         else:
                             add(grid.corner, corner, S(h, h * divergence))
 
-    kernels = SimpleNamespace(clear=clear, forget=forget, scatter=scatter, gather=gather)
-
-    if CORNERS:
-
-        @wp.kernel(module=module)
-        def average(grid: Grid, parameters: Parameters):
-            """Turn the corners' sums into means, and their volume into the filling: its share of the room there."""
-            worker = wp.tid()
-            for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
-                block = grid.active[s / wp.static(BLOCK)]
-                bi = block / parameters.block_rows
-                bj = block - bi * parameters.block_rows
-                i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
-                for b in range(wp.static(BLOCK)):
-                    j = bj * wp.static(BLOCK) + b
-                    corner = grid.corner[i, j]
-                    if corner[0] > F(0.0):
-                        mean = corner / corner[0]
-                        filling = corner[0] * grid.corner_room[i, j]
-                        if DENSITY:
-                            # Up to one as everywhere; beyond one, crowding, which needs the room behind inclined faces.
-                            filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
-                        mean[0] = filling
-                        grid.corner[i, j] = mean
-
-        kernels.average = average
-
-    return kernels
+    return SimpleNamespace(scatter=scatter, gather=gather)

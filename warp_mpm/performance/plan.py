@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from warp_mpm.effect_rules import Rule, effect_rules
+from warp_mpm.effects import Kind
 from warp_mpm.performance.probe import Stepper, clock_of, in_turns
 from warp_mpm.recording import Recorder, Schedule, SnapshotRecorder, TimeSeriesRecorder, Watcher, record_until
 from warp_mpm.scenario import Scenario
@@ -173,8 +174,10 @@ def what_if(
     return switches
 
 
-def described(value: str | bool) -> str:
+def described(value: str | bool | tuple[Kind, ...]) -> str:
     """An effect's value in words."""
+    if isinstance(value, tuple):
+        return ", ".join(str(kind) for kind in value).replace("_", "-") or "off"
     return {True: "on", False: "off"}.get(value, str(value)) if isinstance(value, bool) else value.replace("_", "-")
 
 

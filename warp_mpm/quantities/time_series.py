@@ -33,13 +33,13 @@ def ground(scenario: Any) -> bool:
 
 
 def liquid(scenario: Any) -> bool:
-    """Flows that hold liquid."""
-    return scenario.flow.formulation != "dry"
+    """Scenes that hold liquid."""
+    return scenario.flow.wettest_formulation != "dry"
 
 
 def two_phases(scenario: Any) -> bool:
-    """Flows whose liquid has a velocity of its own."""
-    return scenario.flow.formulation == "two_phase"
+    """Scenes whose liquid has a velocity of its own."""
+    return scenario.flow.wettest_formulation == "two_phase"
 
 
 def arriving(scenario: Any) -> bool:

@@ -165,9 +165,12 @@ class Deposit(Model):
     lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow, or of the law
     where it has a `material`."""
-    material: dict[str, float] | None = None
-    """What its skeleton has otherwise than flow.material: young_modulus_Pa, poisson_ratio and fields of the law; null:
-    nothing."""
+    formulation: Literal["two_phase", "undrained", "dry"] | None = None
+    """Whether its voids hold liquid, and whether that moves on its own; null: as in the flow. All that is wet in a
+    scene has one formulation."""
+    material: dict[str, Any] | None = None
+    """What its material has otherwise than flow.material, any of the fields of one of its law and formulation: `law`
+    with the fields of that law, densities, porosity, moduli, conductivity; null: nothing."""
 
     def laid_on(self, ground: Ground) -> Self:
         """The same deposit as a polygon over `ground`, where it is of the kind on_ground."""
@@ -331,6 +334,17 @@ class TwoPhaseMaterial(UndrainedMaterial):
         return self.hydraulic_conductivity * self.liquid_viscosity_Pa_s / weight
 
 
+COMMON = ("porosity_update", "conductivity_law")
+"""Fields in which wet materials of one scene do not differ."""
+
+
+def formulation_of(material: Skeleton) -> Literal["two_phase", "undrained", "dry"]:
+    """Formulation of a flow of that material."""
+    if isinstance(material, TwoPhaseMaterial):
+        return "two_phase"
+    return "undrained" if isinstance(material, UndrainedMaterial) else "dry"
+
+
 class _FlowBase(VelocityProfile):
     shape: Annotated[FrontAndTail | FlowPolygon | FlowOnGround, Field(discriminator="kind")] | None = None
     """Outline at t = 0; null of a flow that only arrives (`inflow`)."""
@@ -430,28 +444,93 @@ class _FlowBase(VelocityProfile):
 
     @model_validator(mode="after")
     def _other_materials(self) -> Self:
-        known = ("young_modulus_Pa", "poisson_ratio", *LAWS.named(self.material.law).Settings.model_fields)
+        wet = [] if formulation_of(self.material) == "dry" else [self.material]
         for place, deposit in enumerate(self.deposits):
             name = f"deposits[{place}].material"
-            for field in deposit.material or {}:
-                if field not in known:
-                    raise ValueError(f"{name}.{field} is not allowed; a deposit may differ in {', '.join(known)}")
             try:
-                self.material_of(deposit)
+                own = self.material_of(deposit)
             except ScenarioError as error:
                 raise ValueError(f"{name}: {error.problems[0].rstrip('.')}") from None
+            except ValueError as error:
+                raise ValueError(f"{name}.{error}") from None
+            formulation = formulation_of(own)
+            if formulation == "dry":
+                continue
+            wet.append(own)
+            if formulation != formulation_of(wet[0]):
+                raise ValueError(
+                    f'deposits[{place}].formulation = "{formulation}" is not allowed, as what is wet in a scene '
+                    f'has one formulation; it must be "{formulation_of(wet[0])}" or "dry"'
+                )
+            for field in COMMON:
+                here, there = (getattr(material, field, None) for material in (own, wet[0]))
+                if here != there:
+                    raise ValueError(
+                        f"{name}.{field} = {json.dumps(here)} is not allowed, as all that is wet in a scene shares it; "
+                        f"it must be {json.dumps(there)}"
+                    )
         return self
 
     def material_of(self, deposit: Deposit) -> Skeleton:
-        """The material of a deposit: the flow's, but for what its own says."""
-        if not deposit.material:
+        """The material of a deposit: the flow's, but for what its own says. What is left out of another law's fields
+        has that law's defaults.
+
+        Raises:
+            ScenarioError: a field's value is not allowed, or one is missing.
+            ValueError: there is no such field, or law.
+        """
+        given = deposit.material or {}
+        if not given and deposit.formulation in (None, formulation_of(self.material)):
             return self.material
-        return type(self.material).model_validate(self.material.model_dump() | deposit.material)
+        law = given.get("law", self.material.law)
+        if law not in LAWS.names:
+            raise ValueError(f"law = {json.dumps(law)} is not known; it must be one of {', '.join(LAWS.names)}")
+        formulation = deposit.formulation or formulation_of(self.material)
+        kind = _with_law(_MATERIALS[_FLOWS[formulation]], LAWS.named(law))
+        for field in given:
+            if field not in kind.model_fields:
+                raise ValueError(
+                    f'{field} is not allowed; a material with the formulation "{formulation}" and the law "{law}" has '
+                    f"{', '.join(kind.model_fields)}"
+                )
+        base = self.material.model_dump()
+        dropped = set() if law == self.material.law else set(LAWS.named(self.material.law).Settings.model_fields)
+        if not LAWS.named(law).dilates:
+            dropped.add("dilatancy")
+        if "hydraulic_conductivity_m_per_s" in given or "intrinsic_permeability_m2" in given:
+            dropped |= {"hydraulic_conductivity_m_per_s", "intrinsic_permeability_m2"}
+        kept = {name: value for name, value in base.items() if name in kind.model_fields and name not in dropped}
+        return kind.model_validate(kept | given | {"law": law})
 
     @property
     def materials(self) -> list[Skeleton]:
-        """All of the scene's, the flow's first, then those that are its deposits' own."""
-        return [self.material, *(self.material_of(deposit) for deposit in self.deposits if deposit.material)]
+        """All of the scene's, the flow's first, then those that are its deposits' own; equal ones once."""
+        found = [self.material]
+        for deposit in self.deposits:
+            own = self.material_of(deposit)
+            if own not in found:
+                found.append(own)
+        return found
+
+    @property
+    def wettest(self) -> Skeleton:
+        """The first of the scene's materials whose liquid moves on its own; failing that, the first that holds any."""
+        order = ("two_phase", "undrained", "dry")
+        return min(self.materials, key=lambda material: order.index(formulation_of(material)))
+
+    @property
+    def wettest_formulation(self) -> Literal["two_phase", "undrained", "dry"]:
+        """Formulation of a flow of that material: what a scene must know of its liquid."""
+        return formulation_of(self.wettest)
+
+    def of_material(self, place: int) -> Flow:
+        """The flow as if all of it were of one of its materials."""
+        if not place:
+            return self  # type: ignore[return-value]
+        material = self.materials[place]
+        formulation = formulation_of(material)
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return _FLOWS[formulation].model_construct(**fields | {"formulation": formulation, "material": material})
 
     @property
     def polygon(self) -> geometry.Polygon:
@@ -490,6 +569,11 @@ class _FlowBase(VelocityProfile):
     def deposited_volume(self) -> float:
         """Volume of the deposits [m³/m]."""
         return sum(geometry.area(deposit.shape.polygon) for deposit in self.deposits)
+
+    @property
+    def deposited_mass(self) -> float:
+        """Mass of the deposits [kg/m]."""
+        return sum(self.material_of(one).density * geometry.area(one.shape.polygon) for one in self.deposits)
 
     @property
     def depth(self) -> float:
@@ -539,6 +623,8 @@ class DryFlow(_FlowBase):
 
 
 Flow = TwoPhaseFlow | UndrainedFlow | DryFlow
+
+_FLOWS: dict[str, type[Flow]] = {"two_phase": TwoPhaseFlow, "undrained": UndrainedFlow, "dry": DryFlow}
 
 _MATERIALS: dict[type[_FlowBase], type[Skeleton]] = {
     TwoPhaseFlow: TwoPhaseMaterial,

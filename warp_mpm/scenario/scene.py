@@ -71,6 +71,11 @@ class Scenario(Model):
         found += [(one.name, one.x_m, one) for one in self.barriers]
         return sorted(found, key=lambda one: one[1])
 
+    def of_material(self, place: int) -> Scenario:
+        """The scene as if all of it were of one of its materials (`flow.materials`), which nothing but the kernels'
+        numbers of that material are taken from."""
+        return self.model_copy(update={"flow": self.flow.of_material(place)})
+
     @property
     def plain(self) -> bool:
         """Whether the ground is level or absent, and there is no barrier but a single trapezoid or wall."""

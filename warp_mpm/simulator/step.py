@@ -41,7 +41,11 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
         ]
     step += [
         Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
-        *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
+        *(
+            ()
+            if all(law.vectorised for law in effects.laws)
+            else (Launch("yielding", "points", takes, "what the law allows"),)
+        ),
         Launch("bound", "points", takes, "limits that few points come to"),
         Launch(
             "tick",

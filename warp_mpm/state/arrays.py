@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from ..discretization import MaterialPoints
 from ..effects import Effects
@@ -49,11 +50,13 @@ def point_arrays(
     types: SimpleNamespace,
     initial: MaterialPoints,
     *,
-    liquid_bulk_modulus: float,
-    materials: Sequence[Any] = (),
+    liquid_stiffness: NDArray[np.float64],
     device: Any,
 ) -> Group:
-    """State of the material points at the start; fields that nothing is said of begin at 0."""
+    """State of the material points at the start; fields that nothing is said of begin at 0.
+
+    `liquid_stiffness` is the bulk modulus of each point's liquid [N] [Pa], infinite where there is none.
+    """
     count = len(initial.volume)
     given: dict[str, Any] = {
         "position": initial.position,
@@ -65,15 +68,21 @@ def point_arrays(
     }
     if effects.arriving:
         given["pace"] = initial.pace
-    if effects.materials:
-        given |= {"material": initial.material, "materials": materials}
     if effects.liquid:
-        given["liquid_strain"] = -initial.pore_pressure / liquid_bulk_modulus
+        given["liquid_strain"] = -initial.pore_pressure / liquid_stiffness
     for name, field in effects.point_fields.items():
         start = field.start(scenario, initial) if callable(field.start) else field.start
         shape = (count, *getattr(getattr(types, field.kind), "_shape_", ()))
         given[name] = np.ascontiguousarray(np.broadcast_to(start, shape))
     return filled(types.Points(), types.point_fields, given, dict.fromkeys(types.point_fields, count), device)
+
+
+def span_of(points: Group, types: SimpleNamespace, begin: int, end: int) -> Any:
+    """The structure of the points from `begin` to before `end`: a look at the same arrays."""
+    structure = types.Points()
+    for name, array in points.arrays.items():
+        setattr(structure, name, array[begin:end])
+    return structure
 
 
 def arrival_arrays(scenario: Scenario, types: SimpleNamespace, *, device: Any) -> Group:

@@ -93,7 +93,7 @@ class LoadsNow:
     @cached_property
     def _pressed(self) -> Array:
         """Normal loads [n] of both phases on the face's slots [N/m]."""
-        two_phase = self.scenario.flow.formulation == "two_phase"
+        two_phase = self.scenario.flow.wettest_formulation == "two_phase"
         return self._sums[:, at.SLOT_NORMAL] + (self._sums[:, at.SLOT_LIQUID] if two_phase else 0.0)
 
     @cached_property
@@ -114,8 +114,8 @@ class LoadsNow:
     def pore_pressure_patch(self) -> Patch:
         """Of the liquid's pressure."""
         # With two phases the liquid gets its share of the surface, the porosity at the start.
-        two_phase = self.scenario.flow.formulation == "two_phase"
-        share = self.scenario.flow.material.porosity if two_phase else 1.0
+        two_phase = self.scenario.flow.wettest_formulation == "two_phase"
+        share = self.scenario.flow.wettest.porosity if two_phase else 1.0
         return self._greatest(self._sums[:, at.SLOT_LIQUID] / share)
 
     def _greatest(self, load: Array) -> Patch:

@@ -10,11 +10,12 @@ from typing import Any
 from ..effects import Effects
 from ..grid import GridLayout
 from ..kernels import layout as at
-from ..scenario import STANDARD_GRAVITY, Scenario, Skeleton, Trapezoid
+from ..scenario import STANDARD_GRAVITY, Scenario, Trapezoid
+from ..scenario.flow import formulation_of
 from ..simulator.bodies import Body
 from ..simulator.bodies.of_scene import BARRIER
 from ..simulator.bodies.outline import ENDLESS
-from ..simulator.laws import dilatancy
+from ..simulator.laws import LAWS, dilatancy
 from ..time_step import StepLimits, moving_density
 
 
@@ -27,41 +28,26 @@ def kernel_parameters(
     grid: GridLayout,
     limits: StepLimits,
     workers: int,
+    liquid_density: float = 0.0,
 ) -> Any:
     """The kernels' `Parameters`; those of an effect that is absent have no field there.
 
     Args:
-        scenario: the scene.
+        scenario: the scene, as of one of its materials (`Scenario.of_material`).
         effects: its effects.
         types: of the kernels, from `layout`.
         bodies: all that the flow meets.
         grid: from `fit_grid`.
         limits: on the time step.
         workers: threads that share the blocks of the grid in use.
+        liquid_density: of the liquid [kg/m³] whose pressure at rest the filter of the pressure leaves alone: one number
+            for all of the scene's materials, as their pressures are averaged together.
     """
-    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(
-        scenario, effects, limits, scenario.flow.material
-    )
+    values = _grid_and_clock(scenario, effects, grid, limits, workers) | _skeleton(scenario, effects, limits)
     if effects.liquid:
-        values |= _liquid(scenario, effects, limits)
+        values |= _liquid(scenario, effects, limits) | {"true_liquid_density": liquid_density}
     if effects.liquid and effects.bodies:
         values |= _crest(scenario, bodies)
-    return _filled(types, values)
-
-
-def material_parameters(
-    scenario: Scenario, effects: Effects, types: SimpleNamespace, common: Any, *, limits: StepLimits
-) -> list[Any]:
-    """The same for each of the scene's materials: what its skeleton has otherwise, in place of the flow's."""
-    names = [name for name in types.parameter_fields if hasattr(common, name)]
-    found = []
-    for material in scenario.flow.materials:
-        values = {name: getattr(common, name) for name in names}
-        found.append(_filled(types, values | _skeleton(scenario, effects, limits, material)))
-    return found
-
-
-def _filled(types: SimpleNamespace, values: dict[str, Any]) -> Any:
     parameters = types.Parameters()
     for name, value in values.items():
         setattr(parameters, name, types.X(*value) if isinstance(value, tuple) else value)
@@ -90,17 +76,19 @@ def _grid_and_clock(
     } | effects.scheme.numbers(numerics, sound_speed=limits.sound_speed, flow_speed=scenario.flow.greatest_speed)
 
 
-def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits, material: Skeleton) -> dict[str, Any]:
-    numerics = scenario.numerics
+def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
+    material, numerics = scenario.flow.material, scenario.numerics
     values: dict[str, Any] = {
         "solid_density": moving_density(scenario),
         "lame": material.lame_modulus,
         "shear_modulus": material.shear_modulus,
         "bulk_modulus": material.bulk_modulus,
         "grain_share": 1.0 - material.porosity,
-    } | effects.skeleton.numbers(material)
-    if effects.dilatancy:
-        values |= dilatancy.numbers(material, effects.skeleton)
+    }
+    law = LAWS.named(material.law)
+    values |= law.numbers(material)
+    if material.dilatancy is not None:
+        values |= dilatancy.numbers(material, law)
     if effects.density_correction:
         values["density_correction"] = numerics.density_correction
     if effects.bulk_viscosity:
@@ -110,10 +98,11 @@ def _skeleton(scenario: Scenario, effects: Effects, limits: StepLimits, material
 
 def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[str, Any]:
     material: Any = scenario.flow.material
+    if formulation_of(material) == "dry":
+        return {}  # dry in a scene that is wet elsewhere: kernels over its points read none of these
     numerics = scenario.numerics
     values = {
         "porosity": material.porosity,
-        "true_liquid_density": material.liquid_density_kg_per_m3,
         "filling_ratio": material.liquid_density_kg_per_m3 / moving_density(scenario),
         "liquid_bulk_modulus": material.liquid_bulk_modulus_Pa,
         "cavitation_pressure": material.cavitation_pressure_Pa,

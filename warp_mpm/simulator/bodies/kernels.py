@@ -125,6 +125,13 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, R: Any) -> di
         fields["rubbed"] = array(dtype=R)  # on the solid along the surface,
         if effects.liquid:
             fields["alone"] = array(dtype=scalar)  # on liquid that fills the volume, as it would move alone
+    if effects.materials:
+        # Means over the nodes of a place, per mass of the solid, as the parameters of these names.
+        if effects.two_phase:
+            fields["liquid_ratio"] = array(dtype=scalar)
+            fields["drag_per_mass"] = array(dtype=scalar)
+        if effects.liquid_alone:
+            fields["filling_ratio"] = array(dtype=scalar)
     return fields
 
 

@@ -1,0 +1,94 @@
+"""What nodes and corners do by themselves around the transfer: they are emptied, and sums become means."""
+
+from types import SimpleNamespace
+
+import warp as wp
+
+from .elementary import make_elementary
+from .layout import BLOCK
+
+
+def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
+    """Build the kernels `clear` and `average` (workers on the blocks in use) and `forget`."""
+    effects = types.effects
+    F, V, X, S = types.scalar, types.V, types.X, types.S
+    Grid, Parameters = types.Grid, types.Parameters
+    larger = make_elementary(types).larger
+    empty = types.scheme.clear
+    CORNERS = effects.smoothing_grid
+    DENSITY = effects.density_correction
+    LIQUID_ALONE = effects.liquid_alone
+    DRAG, BEYOND, LIQUID_MASS, FILLING = (
+        name in types.grid_fields for name in ("drag", "drag_beyond", "liquid_mass", "filling")
+    )
+    PARTLY_DRY = effects.partly_dry
+    WET = S._length_ - 1
+
+    @wp.kernel(module=module)
+    def clear(grid: Grid, parameters: Parameters):
+        """Empty the nodes of the blocks that were in use. A block's mark is its place in the list of active blocks,
+        counted from one; zero when it is not in use."""
+        worker = wp.tid()
+        for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+            block = grid.active[s / wp.static(BLOCK)]
+            bi = block / parameters.block_rows
+            bj = block - bi * parameters.block_rows
+            i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            grid.block[bi, bj] = 0
+            for b in range(wp.static(BLOCK)):
+                j = bj * wp.static(BLOCK) + b
+                grid.mass[i, j] = F(0.0)
+                grid.velocity[i, j] = V()
+                empty(grid, i, j)
+                if LIQUID_ALONE:
+                    grid.liquid_alone[i, j] = X()
+                if DRAG:
+                    grid.drag[i, j] = F(0.0)
+                if BEYOND:
+                    grid.drag_beyond[i, j] = F(0.0)
+                if LIQUID_MASS:
+                    grid.liquid_mass[i, j] = F(0.0)
+                if FILLING:
+                    grid.filling[i, j] = F(0.0)
+                if CORNERS:
+                    grid.corner[i, j] = S()
+
+    @wp.kernel(module=module)
+    def forget(grid: Grid):
+        """Forget the list of active blocks, once they are empty."""
+        grid.active_count[0] = 0
+
+    kernels = SimpleNamespace(clear=clear, forget=forget)
+
+    if CORNERS:
+
+        @wp.kernel(module=module)
+        def average(grid: Grid, parameters: Parameters):
+            """Turn the corners' sums into means, and their volume into the filling: its share of the room there."""
+            worker = wp.tid()
+            for s in range(worker, grid.active_count[0] * wp.static(BLOCK), parameters.workers):
+                block = grid.active[s / wp.static(BLOCK)]
+                bi = block / parameters.block_rows
+                bj = block - bi * parameters.block_rows
+                i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+                for b in range(wp.static(BLOCK)):
+                    j = bj * wp.static(BLOCK) + b
+                    corner = grid.corner[i, j]
+                    if corner[0] > F(0.0):
+                        mean = corner / corner[0]
+                        filling = corner[0] * grid.corner_room[i, j]
+                        if DENSITY:
+                            # Up to one as everywhere; beyond one, crowding, which needs the room behind inclined faces.
+                            filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
+                        mean[0] = filling
+                        if PARTLY_DRY:
+                            # Means of the liquid over the points that have any, and last the share of the room there.
+                            wet = corner[wp.static(WET)]
+                            for k in range(2, wp.static(WET)):
+                                mean[k] = corner[k] / larger(wet, F(1.0e-30))
+                            mean[wp.static(WET)] = wet * grid.corner_room[i, j]
+                        grid.corner[i, j] = mean
+
+        kernels.average = average
+
+    return kernels
