@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,10 +18,12 @@ from analytic.calibration import Calibration, KeyFigures
 from analytic.field_data import SYNTHETIC, Agreement, Events
 from analytic.force_record import moving_mean
 from analytic.impact import Impact
-from analytic.reliability import Reliability
-from analytic.sweep import Run
 from analytic.sweep_fit import SMALL_DISPLACEMENT
 from analytic.whole_file import UnwrittenError, whole_file
+
+if TYPE_CHECKING:
+    from analytic.reliability import Reliability  # with SciPy's statistics, which take a second
+    from analytic.sweep import Run
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,6 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from scipy.stats import qmc
-
 from analytic.calibration import CalibrationError, at_rest, measure, measured_key_figures, measured_vertical_load_ratio
 from analytic.scene import Scene, SceneError, read_scene
 from analytic.time_series import read_time_series
@@ -59,6 +57,8 @@ def plan(template: Mapping[str, Any], count: int, seed: int = 1) -> dict[str, di
     """
     if count < 1:
         raise ValueError(f"count is {count}, it must be at least 1.")
+    from scipy.stats import qmc
+
     points = qmc.Sobol(len(RANGES) + 1, seed=seed).random(count)
     return {f"scene_{index:03d}": _scene(template, _stretch(point), index) for index, point in enumerate(points)}
 

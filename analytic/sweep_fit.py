@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from analytic.fitted import Coefficients, Constants, coefficients
 from analytic.scene import Scene
@@ -111,6 +110,8 @@ def fit(runs: Sequence[Run]) -> Constants:
         return np.log(p[0] * turned + p[1] / froude**2) + p[2] * log_share - np.log(over_dynamic)
 
     low, high = [1e-3, 1e-3, -1.0], [np.inf, np.inf, 1.0]
+    from scipy.optimize import least_squares
+
     found = least_squares(residuals, [1.0, 0.5, 0.0], bounds=(low, high), loss="soft_l1", f_scale=ROBUST_SCALE)
     return Constants(
         jet=float(found.x[0]),

@@ -1,10 +1,15 @@
 """What all tests share."""
 
+import os
+
 import pytest
 
 from warp_mpm import run
 
 DRAW = run._draw
+
+# Processes that tests begin would otherwise compile all of the packages' sources, a third of a second each.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 LONGEST = (
     "test_known_answers.py",

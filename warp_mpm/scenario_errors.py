@@ -14,6 +14,7 @@ from typing import Any
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel, ValidationError
 
+from warp_mpm.field_docstrings import field_docstrings
 from warp_mpm.shipped import where_to_get
 
 LARGEST_FILE = 16 * 1024 * 1024
@@ -123,7 +124,7 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
     else:
         words = _range_of(annotation) or _plain(problem)
         if kind in ("too_short", "too_long") and owner is not None and _is_fixed_list(annotation):
-            meaning = str(owner.model_fields[str(location[-1])].description).rstrip(".")
+            meaning = field_docstrings(owner)[str(location[-1])].rstrip(".")
             words += f": {meaning[0].lower()}{meaning[1:]}"
         yield f"{path or 'The scenario'} = {_shown(value)} is not allowed; it must be {words}."
 

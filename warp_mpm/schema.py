@@ -5,11 +5,21 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationError,
+)
 from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema
 
+from warp_mpm.field_docstrings import field_docstrings
 from warp_mpm.scenario_errors import ScenarioError, sentences
 
 
@@ -49,9 +59,10 @@ class Model(BaseModel):
     Whichever way it is made, a value that is not allowed raises ScenarioError, with one sentence per problem.
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
+
+    fields_from: ClassVar[tuple[type[BaseModel], ...]] = ()
+    """Models out of which `set_fields` put fields into this one."""
 
     def __init__(self, /, **fields: Any) -> None:
         with _refusals(type(self)):
@@ -80,6 +91,14 @@ class Model(BaseModel):
         with _refusals(cls):
             return super().model_validate_json(json_data, **options)
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = handler(core_schema)
+        properties = handler.resolve_ref_schema(schema)["properties"]
+        for name, text in field_docstrings(cls).items():
+            properties[name]["description"] = text
+        return schema
+
 
 @contextmanager
 def _refusals(model: type[BaseModel], source_name: str | None = None) -> Iterator[None]:
@@ -98,4 +117,5 @@ def set_fields(model: type[Model], fields: Mapping[str, tuple[Any, Any]]) -> Non
         field = default if isinstance(default, FieldInfo) else FieldInfo.from_annotated_attribute(annotation, default)
         model.model_fields[name] = field
         model.__annotations__[name] = annotation
-    model.model_rebuild(force=True)
+    if model.__pydantic_complete__:  # else it is built when it is first used
+        model.model_rebuild(force=True)

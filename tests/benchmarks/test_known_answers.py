@@ -59,16 +59,22 @@ ALONE = (
     *("incline", "inertial-settling", "pressure-on-a-slope", "saturated-wave", "spreading", "voellmy"),
 )
 """Cases whose kernels hardly another test needs: compiling them takes longer than the case. Their quick variants are
-run with `slow`; `film`, `hydrostatic`, `rough-slope`, `collapse` and `free-settling` stand for their kind."""
+run with `slow`; `at-rest`, `rough-slope`, `free-settling` and those of `LONG` stand for their kind."""
 
 LONG = {
+    "hydrostatic": "at-rest: the same column of the two-phase law, against a face",
+    "terzaghi": "free-settling: the same two fields of equations, and drag, to a steady state",
+    "jet": "bore: a flow turned by a wall, its force against theory",
+    "collapse": "rough-slope: the same law and ground; tests/warp_mpm/test_three_dimensions.py: another collapse",
+    "film": "tests/warp_mpm/test_rooms.py: a fluid that shears as theory says; test_laws.py: the law against bisection",
+    "pressure-quality": "face-friction: pressures on the face; tests/hard_cases/test_safeguards.py: their noise",
     "drag-relaxation": "free-settling; tests/warp_mpm/test_drag.py: explicit and inertial drag",
     "force-history": "tests/warp_mpm/test_contact.py: reactions are the momentum change",
     "dam-break": "bore and sloshing: the same equations of shallow water, another wave",
     "rotation": "tests/warp_mpm/test_schemes.py: a disc that turns twice",
     "time-step": "tests/warp_mpm/test_time_step.py, and test_schemes.py: a wave at two lengths of the step",
 }
-"""Cases whose quick variants take ten seconds and are run with `slow`, and what checks their kind more coarsely."""
+"""Cases whose quick variants take four to ten seconds and are run with `slow`, and what checks their kind always."""
 
 
 def unexpected(case, quick):

@@ -140,8 +140,9 @@ def run_command(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_command_compares_a_scenario(tmp_path: Path) -> None:
-    done = run_command("check", "scenarios/set_v.json", "--spacing", 1.0, "--out", tmp_path, "--json")
-    assert done.returncode == 0, done.stderr
+    scene = ROOT / "scenarios" / "set_v.json"
+    done = CliRunner().invoke(app, ["check", str(scene), "--spacing", "1.0", "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
     (content,) = json.loads(done.stdout)
     assert [unit["name"] for unit in content["units"]] == [
         "paper",
@@ -164,7 +165,7 @@ def test_command_compares_a_scenario(tmp_path: Path) -> None:
 def test_command_compares_nothing_with_what_was_not_over(tmp_path: Path) -> None:
     scene = ROOT / "scenarios" / "case_1.json"
     arguments = ("check", scene, "--spacing", 1.0, "--until", 1.2, "--out", tmp_path)
-    (content,) = json.loads(run_command(*arguments, "--json").stdout)
+    (content,) = json.loads(CliRunner().invoke(app, [*map(str, arguments), "--json"]).stdout)
     bounds = ["impulse", "barrier_displacement_final", "barrier_velocity_max"]
     assert content["at_least"] == bounds
     for unit in content["units"]:

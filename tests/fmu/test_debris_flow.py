@@ -250,7 +250,6 @@ def test_dead_worker_is_reported(open_unit: Open) -> None:
 @posix_only
 def test_hanging_worker_is_ended(open_unit: Open) -> None:
     host = open_unit("DebrisFlow").initialize(reply_time_limit=20.0, **QUICK)
-    host.again(reply_time_limit=20.0, **QUICK)
     (process_id,) = workers()
     os.kill(process_id, signal.SIGSTOP)
     (slave,) = (item for item in gc.get_objects() if type(item).__name__ == "DebrisFlow")

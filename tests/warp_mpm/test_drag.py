@@ -159,6 +159,8 @@ def test_inertial_drag_slows_the_slip_by_its_square(load_scene):
             "numerics.spacing_m": 0.5,
             "numerics.courant_number": courant_number,
             "gravity.acceleration_m_per_s2": 0.0,
+            "barrier": None,
+            "ground": None,
             "flow.shape": BLOCK,
             "flow.velocity_m_per_s": [0.0, 0.0],
             "flow.initial_stress": "zero",

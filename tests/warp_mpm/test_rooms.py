@@ -101,6 +101,26 @@ class Stiff(Damped):
     vectorised = False
 
 
+class Counting(Apic):
+    name = "counting"
+    title = "apic, with a count of its steps at each point"
+    point_fields = Apic.point_fields | {"count": PointField(meaning="the count")}
+
+    def kernels(self, types, tools, module):
+        F, Points = types.scalar, types.Points
+        read, write = tools.read, tools.write
+
+        @wp.kernel(module=module)
+        def counted(points: Points):
+            p = wp.tid()
+            write(points.count, p, read(points.count, p) + F(1.0))
+
+        return {"counted": counted}
+
+    def launches(self):
+        return (("gather", Launch("counted", "points", ("points",), "counts steps")),)
+
+
 COARSE = {"numerics.spacing_m": 0.5, "output.end_time_s": 1.0}
 GROUND_ALONE = COARSE | {"barrier": None, "ground.friction": 0.3}
 """Kernels of a scene without barrier compile in two thirds of the time."""
@@ -242,12 +262,19 @@ def test_own_fields_begin_as_they_say_and_no_viscosity_is_none(load_scene):
     assert np.abs(viscous.points()["position"] - positions[0]).max() > 0.01
 
 
-def test_a_law_may_have_a_kernel_of_its_own(load_scene):
+def test_a_law_and_a_scheme_may_have_kernels_of_their_own(load_scene):
+    """Both in one scene, whose kernels are compiled once."""
     laws.register(Damped())
     laws.register(Stiff())
-    launched = {name: Simulation(scene(load_scene, name)).launched_kernels for name in ("damped", "stiff")}
-    assert "yielding" in launched["stiff"]
-    assert "yielding" not in launched["damped"]
+    schemes.register(Counting())
+    simulation = Simulation(scene(load_scene, "stiff").replaced({"numerics.transfer": "counting"}))
+    simulation.advance(until=0.02)
+    order = simulation.launched_kernels
+    assert order.index("counted") == order.index("gather") + 1
+    assert (simulation.points(["count"])["count"] == simulation.steps).all()
+    assert "yielding" in order
+    assert simulation.points(["seen"])["seen"].max() > 0.5
+    assert not {"yielding", "counted"} & set(Simulation(scene(load_scene, "damped")).launched_kernels)
 
 
 @pytest.mark.slow  # two sets of kernels
@@ -372,34 +399,6 @@ def test_what_cannot_be_registered():
         with pytest.raises(ValueError, match=words):
             schemes.register(scheme)
     assert schemes.names() == ("flip", "apic", "aflip")
-
-
-def test_a_scheme_may_bring_kernels_of_its_own(load_scene):
-    class Counting(Apic):
-        name = "counting"
-        title = "apic, with a count of its steps at each point"
-        point_fields = Apic.point_fields | {"count": PointField(meaning="the count")}
-
-        def kernels(self, types, tools, module):
-            F, Points = types.scalar, types.Points
-            read, write = tools.read, tools.write
-
-            @wp.kernel(module=module)
-            def counted(points: Points):
-                p = wp.tid()
-                write(points.count, p, read(points.count, p) + F(1.0))
-
-            return {"counted": counted}
-
-        def launches(self):
-            return (("gather", Launch("counted", "points", ("points",), "counts steps")),)
-
-    schemes.register(Counting())
-    simulation = Simulation(load_scene("case_1_dry", **GROUND_ALONE, **{"numerics.transfer": "counting"}))
-    simulation.advance(until=0.02)
-    order = simulation.launched_kernels
-    assert order.index("counted") == order.index("gather") + 1
-    assert (simulation.points(["count"])["count"] == simulation.steps).all()
 
 
 @pytest.mark.parametrize("name", ["case_1", "case_1_dry", pytest.param("hard/flip", marks=pytest.mark.slow)])

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from warp_mpm.accuracy.budget import Budget
 from warp_mpm.accuracy.measure import smoothed_force
@@ -134,6 +133,8 @@ def extrapolate(spacings: Sequence[float], values: Sequence[float]) -> Reference
         (f0, a), *_ = np.linalg.lstsq(basis * weights[:, None], f * weights, rcond=None)
         residual = f - basis @ (f0, a)
         return float(f0), float(a), float(np.sqrt((residual**2 * weights).sum() / weights.sum()))
+
+    from scipy.optimize import minimize_scalar
 
     best = float(minimize_scalar(lambda p: fit(p)[2], bounds=(0.1, 4.0), method="bounded").x)
     f0, change, scatter = fit(best)

@@ -16,7 +16,14 @@ import warp as wp
 
 def make_elementary(types: SimpleNamespace) -> SimpleNamespace:
     """Build `read(array, p)`, `write(array, p, value)`, `add(array, p, value)` (atomic on a GPU), `larger(a, b)`,
-    `smaller(a, b)`, `logarithm(x)` and `exponential(x)`. In an array of two dimensions p counts through, row by row."""
+    `smaller(a, b)`, `logarithm(x)` and `exponential(x)`; of the same types once. In an array of two dimensions p counts
+    through, row by row."""
+    if not hasattr(types, "elementary"):
+        types.elementary = _make(types)
+    return types.elementary
+
+
+def _make(types: SimpleNamespace) -> SimpleNamespace:
     F = types.scalar
     forms = {number: ("array.data[p] = value;", "wp::atomic_add(&array.data[p], value);") for number in (F, wp.int32)}
     for vector in (types.V2, types.V4, types.V, types.S, types.P, types.X, types.T, types.G):

@@ -651,7 +651,6 @@ def _with_law(material: type[Skeleton], law: Law) -> type[Skeleton]:
         __base__=(material,) if law.Settings is Model else (law.Settings, material),
         __module__=__name__,
         __doc__=f"{material.__doc__} Law: {law.title}.",
-        __cls_kwargs__={"use_attribute_docstrings": False},  # the bases have them; looking for more takes long
         law=tag,
     )
     globals()[name] = made

@@ -83,6 +83,7 @@ def offer_schemes() -> None:
     fields = {"transfer": (names, Numerics.model_fields["transfer"].default)}
     for scheme in SCHEMES:
         fields |= {name: (field.rebuild_annotation(), field) for name, field in scheme.settings.model_fields.items()}
+    Numerics.fields_from = tuple(scheme.settings for scheme in SCHEMES)
     set_fields(Numerics, fields)
 
 
