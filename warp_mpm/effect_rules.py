@@ -332,7 +332,8 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
 
 
 def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
-    """Changes that give the skeleton another law and leave all else, the initial stress too, as it is.
+    """Changes that give the skeleton another law and leave all else, the initial stress too, as it is; deposits keep
+    what is no field of the old law.
 
     Args:
         scenario: the scene.
@@ -344,7 +345,13 @@ def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
     if not LAWS.named(law).dilates:
         dropped.add("dilatancy")
     kept = {name: value for name, value in flow["material"].items() if name not in dropped}
-    changed = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio}
+    changed: dict[str, Any] = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio, "deposits": []}
+    for deposit, there in zip(scenario.flow.deposits, flow["deposits"], strict=True):
+        if deposit.material and deposit.lateral_stress_coefficient is None:
+            lies = LAWS.named(scenario.flow.material.law).lateral_stress_ratio(scenario.flow.material_of(deposit))
+            there["lateral_stress_coefficient"] = lies
+        other = {name: value for name, value in (deposit.material or {}).items() if name not in dropped}
+        changed["deposits"].append(there | {"material": other or None})
     return {"flow": flow | changed | {"material": kept | {"law": law, **own}}}
 
 

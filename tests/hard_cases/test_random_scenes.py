@@ -67,6 +67,14 @@ def scenes(formulations, precisions, transfers):
                 "cohesion_Pa": cohesion,
                 "tension_cutoff_Pa": draw(st.sampled_from([0.0, 0.5])) * cohesion,
             }
+            if draw(st.booleans()):
+                material["dilatancy_angle_deg"] = 0.0
+                material["dilatancy"] = {
+                    # Loose or dense by what soils are, and by what none is.
+                    "critical_solid_fraction": min(max(1.0 - material["porosity"] + draw(pick(-0.3, 0.3)), 0.01), 0.99),
+                    "coefficient": draw(zero_or(-1, 2)),
+                    "grain_diameter_m": draw(logarithmic(-5, 0)),
+                }
         if law == "coulomb_viscous":
             material["mixture_viscosity_Pa_s"] = draw(zero_or(-3, 6))
         if law == "herschel_bulkley":
@@ -90,14 +98,21 @@ def scenes(formulations, precisions, transfers):
         if formulation == "two_phase":
             material["hydraulic_conductivity_m_per_s"] = draw(logarithmic(-9, 1))
             material["inertial_drag_coefficient"] = draw(st.sampled_from([0.0, 0.4, 100.0]))
+            material["conductivity_law"] = draw(st.sampled_from(["constant", "kozeny_carman", "exponential"]))
+            material["conductivity_scale"] = draw(pick(0.005, 0.1))
+            material["porosity_update"] = material["conductivity_law"] != "constant" or draw(st.booleans())
         if formulation != "dry":
             material["liquid_bulk_modulus_Pa"] = draw(logarithmic(6, 8.5))
             if flow["initial_stress"] == "geostatic":
-                flow["initial_pore_pressure_ratio"] = draw(st.one_of(st.none(), pick(0.0, 1.0)))
-        for name in [*drained, "inertial_drag_coefficient", "porosity_update"] * (formulation != "two_phase") + wet * (
-            formulation == "dry"
-        ):
+                start = draw(st.sampled_from(["", "initial_pore_pressure_ratio", "initial_pore_pressure_ratios"]))
+                if start:
+                    tail, front = draw(pick(0.0, 1.0)), draw(pick(0.0, 1.0))
+                    flow[start] = tail if start.endswith("ratio") else [[-10.0, tail], [0.0, front]]
+        drained += ["inertial_drag_coefficient", "porosity_update", "conductivity_law", "conductivity_scale"]
+        for name in drained * (formulation != "two_phase") + wet * (formulation == "dry"):
             material.pop(name, None)
+        flow["base_velocity_share"] = draw(st.one_of(st.just(1.0), pick(0.0, 1.0)))
+        flow["velocity_exponent"] = draw(pick(0.1, 3.0))
         volume = (2 + flow["shape"]["squares"]) * depth**2
         data["barrier"] = {
             "shape": {
@@ -113,7 +128,10 @@ def scenes(formulations, precisions, transfers):
             },
             "friction": draw(pick(0.01, 1.0)),
         }
-        data["ground"] = {"friction": draw(pick(0.01, 1.0))}
+        data["ground"] = {
+            "friction": draw(pick(0.01, 1.0)),
+            "turbulence_m_per_s2": draw(st.one_of(st.none(), logarithmic(1, 4))),
+        }
         data["gravity"] = {"acceleration_m_per_s2": draw(pick(0.0, 20.0)), "tilt_deg": draw(pick(-20.0, 30.0))}
         data["numerics"] |= {
             "spacing_m": draw(pick(0.3, 0.8)),

@@ -2,11 +2,14 @@
 
 import json
 import math
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from warp_mpm.cli import app
+from warp_mpm.discretization import material_points
 from warp_mpm.performance.plan import Ahead, growth, make_plan, predicted_steps, run_ahead, what_if
 from warp_mpm.recording import SnapshotRecorder, TimeSeriesRecorder, record_until
 from warp_mpm.simulation import Simulation
@@ -81,6 +84,37 @@ def test_what_if_switches_one_effect_at_a_time(load_scene, monkeypatch):
     assert sliding.change == "on → off"
     assert drag.steps > 20 * base.steps
     assert sliding.steps == base.steps
+
+
+def test_what_if_tells_the_cost_of_every_law(load_scene, monkeypatch):
+    """By stand-ins that step nothing: a compilation each is much."""
+    from warp_mpm.performance import plan
+
+    stepped = []
+
+    class Standing:
+        def __init__(self, scenario, **_):
+            stepped.append(scenario)
+            self.simulation = SimpleNamespace(material_points=100)
+
+    monkeypatch.setattr(plan, "Stepper", Standing)
+    monkeypatch.setattr(plan, "in_turns", lambda steppers, **_: [float(100 + k) for k in range(len(steppers))])
+    monkeypatch.setattr(plan, "run_ahead", lambda scenario, **_: [Ahead(0.0, 10.0, 1e-4)])
+    laws = {}
+    for name in ("case_1", "case_1_loose", "site_two_surges"):
+        switches = what_if(load_scene(name, **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.5}))
+        laws[name] = [switch.change for switch in switches if switch.effect == "law"]
+    assert laws["case_1"] == [
+        f"mohr-coulomb → {law}" for law in ("elastic", "herschel-bulkley", "coulomb-viscous", "mu-i")
+    ]
+    assert laws["case_1_loose"] == laws["site_two_surges"] == laws["case_1"]
+    muddy = next(one for one in stepped if one.flow.deposits and one.flow.material.law == "herschel_bulkley")
+    assert "friction_angle_deg" not in (muddy.flow.deposits[0].material or {})
+    # The deposit starts with the stress that its own law had given it.
+    sandy = next(one for one in stepped if one.flow.deposits)
+    np.testing.assert_allclose(
+        material_points(muddy).effective_stress, material_points(sandy).effective_stress, rtol=1e-12
+    )
 
 
 def test_command(tmp_path, monkeypatch):

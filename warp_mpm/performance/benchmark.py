@@ -9,6 +9,7 @@ from typing import Any
 from warp_mpm.effect_rules import with_law, without_liquid
 from warp_mpm.performance.arrival import arrival_cost
 from warp_mpm.performance.machine import processor
+from warp_mpm.performance.plan import OWN_FIELDS
 from warp_mpm.performance.probe import Measured, Stepper, clock_of, in_turns
 from warp_mpm.performance.table import Progress, Table
 from warp_mpm.performance.whole_runs import first_run, recording, several_at_once
@@ -55,16 +56,6 @@ def effect_costs(base: Scenario, *, device: str, progress: Progress) -> list[tup
     measured: list[Measured] = [yardstick, *steppers]
     costs = in_turns(measured, rounds=ROUNDS, seconds=0.5 * TURN)
     return [(name, cost / costs[0], cost) for (name, _), cost in zip(named, costs[1:], strict=True)]
-
-
-OWN_FIELDS: dict[str, dict[str, Any]] = {
-    "mohr_coulomb": {"friction_angle_deg": 20.0},
-    "elastic": {},
-    "herschel_bulkley": {"yield_stress_Pa": 500.0, "consistency_Pa_s": 20.0, "flow_exponent": 0.5},
-    "coulomb_viscous": {"friction_angle_deg": 20.0, "mixture_viscosity_Pa_s": 200.0},
-    "mu_i": {"static_friction": 0.38, "dynamic_friction": 0.64, "grain_diameter_m": 0.01},
-}
-"""Fields of each law where its cost is measured."""
 
 
 def law_costs(base: Scenario, *, device: str, progress: Progress) -> Table:

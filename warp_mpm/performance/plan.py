@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from warp_mpm.effect_rules import Rule, effect_rules
+from warp_mpm.effect_rules import Rule, effect_rules, with_law
 from warp_mpm.effects import Kind
 from warp_mpm.performance.probe import Stepper, clock_of, in_turns
 from warp_mpm.recording import Recorder, Schedule, SnapshotRecorder, TimeSeriesRecorder, Watcher, record_until
@@ -32,6 +33,16 @@ TIMED_RECORDS = 5
 
 TWIN_STRETCHES = 200
 """Stretches of the twin's run."""
+
+
+OWN_FIELDS: dict[str, dict[str, Any]] = {
+    "mohr_coulomb": {"friction_angle_deg": 20.0},
+    "elastic": {},
+    "herschel_bulkley": {"yield_stress_Pa": 500.0, "consistency_Pa_s": 20.0, "flow_exponent": 0.5},
+    "coulomb_viscous": {"friction_angle_deg": 20.0, "mixture_viscosity_Pa_s": 200.0},
+    "mu_i": {"static_friction": 0.38, "dynamic_friction": 0.64, "grain_diameter_m": 0.01},
+}
+"""Fields of each law where its cost is measured; their values change none of it."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +157,8 @@ def make_plan(scenario: Scenario, *, device: str = "cpu", clock: Callable[[], fl
 def what_if(
     scenario: Scenario, *, device: str = "cpu", on_progress: Callable[[str], None] | None = None
 ) -> list[Switch]:
-    """The run as it is, and with each effect switched, one at a time. New effects are compiled first, seconds each.
+    """The run as it is, and with each effect switched, one at a time; the law to each other one. New effects are
+    compiled first, seconds each.
 
     Args:
         on_progress: called with the name of each effect before it is compiled.
@@ -154,9 +166,13 @@ def what_if(
     ahead = run_ahead(scenario, device=device)
     scenes, names, changes = [scenario], ["as it is"], [""]
     for rule in effect_rules(scenario):
-        if rule.switched:
-            switched = scenario.replaced(rule.switched)
-            after = {other.effect: other.value for other in effect_rules(switched)}[rule.effect]
+        others = [rule.switched] if rule.switched else []
+        if rule.effect == "law":
+            here = scenario.flow.material.law
+            others = [with_law(scenario, law, **own) for law, own in OWN_FIELDS.items() if law != here]
+        for other in others:
+            switched = scenario.replaced(other)
+            after = {then.effect: then.value for then in effect_rules(switched)}[rule.effect]
             scenes.append(switched)
             names.append(rule.effect)
             changes.append(f"{described(rule.value)} → {described(after)}")

@@ -652,7 +652,7 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
         "case_1",
         {"flow.initial_pore_pressure_ratios": [[-15.0, 1.0 / 1.8], [-6.0, 1.0]]},  # hydrostatic behind
     ),
-    "the same, linear velocity from 0 at the bed": ("case_1", {"flow.base_velocity_share": 0.0}),
+    "the same, from half the velocity at the bed": ("case_1", {"flow.base_velocity_share": 0.5}),
     "the same, inertial drag (Ergun)": ("case_1", {"flow.material.inertial_drag_coefficient": 0.404}),
     "the same, loose: solid fraction 0.50 of 0.56": ("case_1_loose", {}),
     "the same, dense: 0.50 of 0.44": (
