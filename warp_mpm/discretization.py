@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,10 +12,14 @@ from numpy.typing import NDArray
 
 from warp_mpm import geometry
 from warp_mpm.scenario import Inflow, Scenario, Skeleton
+from warp_mpm.scenario.flow import formulation_of
 from warp_mpm.scenario.inflow import APPROACH
 from warp_mpm.simulator.laws import LAWS
 
 Array = NDArray[np.float64]
+
+TOUCHING = 1e-3
+"""Cells by which the underside of a body may lie off the surface that it stands on."""
 
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
@@ -97,11 +102,22 @@ class _Part:
     """[N] m below its surface."""
     slope: Array
     """[N] dy/dx of the long slope whose stress it has."""
-    pore_pressure_ratio: float | Array | None
+    pore_pressure_ratio: Callable[[Array], float | Array | None]
+    """λ_p at places x [M] [m], one or [M]; None: hydrostatic."""
     lateral_stress_ratio: float
     material: Skeleton
     velocity: tuple[float, float] | Array = (0.0, 0.0)
     """Of all, or [N, 2] [m/s]."""
+    outline: geometry.Polygon | None = None
+    """[V, 2] [m]; None of what arrives."""
+
+    def borne(self, x: Array) -> float | Array:
+        """What the liquid bears at places x [M] [m] of the weight above, as a density [kg/m³]: hydrostatic, or the
+        given share of it."""
+        ratio = self.pore_pressure_ratio(x)
+        if ratio is None:
+            return float(getattr(self.material, "liquid_density_kg_per_m3", 0.0))
+        return ratio * self.material.density
 
 
 def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
@@ -280,7 +296,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
 
     Geostatic start (paper, §2.2): along each vertical below the outline the pore pressure is hydrostatic, or the given
     share of the weight, constant or along the flow; the vertical effective stress carries the rest, and the horizontal
-    ones are K0 times it.
+    ones are K0 times it. A body bears what stands on it, and its liquid the pressure of the liquid there.
     Gravity's component along the ground is left out of the initial stress.
 
     Over a profile the stress is that of a long slope of the angle alpha that surface and ground share, the lesser of
@@ -290,29 +306,31 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     flow, numerics = scenario.flow, scenario.numerics
     parts: list[_Part] = []
     lateral = flow.lateral_stress_ratio
-    ratio: float | Array | None
     if flow.shape is not None:
-        filled = _filled(scenario, flow.shape.polygon)
-        ratio = flow.pore_pressure_ratio(filled[0][:, 0])
-        velocity = _velocity(scenario, flow.shape.polygon, *filled[:3])
-        parts.append(_Part(*filled, ratio, lateral, flow.material, velocity))
+        outline = flow.shape.polygon
+        filled = _filled(scenario, outline)
+        velocity = _velocity(scenario, outline, *filled[:3])
+        parts.append(_Part(*filled, flow.pore_pressure_ratio, lateral, flow.material, velocity, outline))
     for deposit in flow.deposits:
         own, material = deposit.lateral_stress_coefficient, flow.material_of(deposit)
         if own is None:
             other = deposit.material is not None or deposit.formulation is not None
             own = LAWS.named(material.law).lateral_stress_ratio(material) if other else lateral
-        parts.append(_Part(*_filled(scenario, deposit.shape.polygon), None, own, material))
+        outline = deposit.shape.polygon
+        parts.append(_Part(*_filled(scenario, outline), lambda _: None, own, material, outline=outline))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
         ratio = coming.pore_pressure_ratio
-        if coming.pore_pressure_ratio is None:
+        if ratio is None:
             ratio = flow.pore_pressure_ratio(np.full(len(coming.volume), flow.inflow.x_m))
         slope = np.full(len(coming.volume), flow.inflow.slope)
-        parts.append(_Part(coming.position, coming.volume, coming.below, slope, ratio, lateral, flow.material))
+        parts.append(
+            _Part(coming.position, coming.volume, coming.below, slope, lambda _: ratio, lateral, flow.material)
+        )
         entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
-    stresses = [_initial_stress(scenario, part) for part in parts]
+    stresses = [_initial_stress(scenario, part, parts) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
     materials = flow.materials
     place = np.repeat([materials.index(part.material) for part in parts], [len(part.volume) for part in parts])
@@ -356,19 +374,43 @@ def _velocity(
     return np.multiply.outer(paces, np.array(flow.velocity_m_per_s))
 
 
-def _initial_stress(scenario: Scenario, part: _Part) -> tuple[Array, Array]:
+def _load(others: Sequence[_Part], surface: Array, downward: float, near: float) -> tuple[Array, Array]:
+    """Total stress and pressure of the liquid [N] [Pa] that other bodies put on places [N, 2] of a body's surface."""
+    total, pore = np.zeros(len(surface)), np.zeros(len(surface))
+    for other in others:
+        if other.outline is None:
+            continue
+        on = geometry.stands_on(other.outline, surface, near)
+        if not on.any():
+            continue
+        # Just above the underside, where the surface straight above is that of the body that stands there.
+        foot = surface[on] + [0.0, 2.0 * near]
+        height = geometry.depth_below_surface(other.outline, foot) + 2.0 * near
+        further = [one for one in others if one is not other]
+        above, pore_above = _load(further, surface[on] + height[:, None] * [0.0, 1.0], downward, near)
+        total[on] += above + other.material.density * downward * height
+        if formulation_of(other.material) != "dry":
+            pore[on] += pore_above + other.borne(foot[:, 0]) * downward * height
+    return total, pore
+
+
+def _initial_stress(scenario: Scenario, part: _Part, parts: Sequence[_Part]) -> tuple[Array, Array]:
     """Effective stress [N, 4] and pore pressure [N] of a part of the scene."""
     flow, material = scenario.flow, part.material
     pore_pressure = np.zeros(len(part.volume))
     effective_stress = np.zeros((len(part.volume), 4))
     if flow.initial_stress == "geostatic":
-        depth, share = part.below, part.pore_pressure_ratio
+        depth, borne = part.below, part.borne(part.position[:, 0])
         downward = -scenario.gravity.vector[1]
-        liquid_density = getattr(material, "liquid_density_kg_per_m3", 0.0)
-        # What the liquid bears of the weight above, as a density: hydrostatic, or the given share of it.
-        borne = liquid_density if share is None else share * material.density
         pore_pressure = borne * downward * depth
         vertical = -(material.density - borne) * downward * depth
+        if part.outline is not None and len(parts) > 1:
+            surface = part.position + depth[:, None] * [0.0, 1.0]
+            others = [one for one in parts if one is not part]
+            load, pore = _load(others, surface, downward, TOUCHING * scenario.numerics.spacing_m)
+            pore *= formulation_of(material) != "dry"
+            pore_pressure += pore
+            vertical -= load - pore
         lateral = part.lateral_stress_ratio * vertical
         effective_stress[:, 0], effective_stress[:, 1], effective_stress[:, 2] = lateral, vertical, lateral
         if part.slope.any():

@@ -158,6 +158,12 @@ class Effects:
         return self.friction and self.liquid
 
     @property
+    def module_names(self) -> list[str]:
+        """Names of all the Warp modules: the first kind's, and one for the kernels over points of each further kind,
+        which have the same names."""
+        return [self.module_name, *(f"{self.module_name}.{number}" for number in range(1, len(self.kinds)))]
+
+    @property
     def module_name(self) -> str:
         """Name of the Warp module: one per set of effects."""
         flags: list[str] = ["space"] if self.dimensions == 3 else []

@@ -150,6 +150,17 @@ def surface_slope(polygon: Polygon, points: NDArray[np.float64]) -> NDArray[np.f
     return slope
 
 
+def stands_on(polygon: Polygon, points: NDArray[np.float64], near: float) -> NDArray[np.bool_]:
+    """Whether the polygon's underside lies at each of `points` [N, 2], to within `near` [m] of height."""
+    x, y = points[:, 0], points[:, 1]
+    found = np.zeros(len(points), dtype=bool)
+    outline = anticlockwise(polygon)
+    for (x0, y0), (x1, y1) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        if x1 > x0:
+            found |= (x >= x0) & (x <= x1) & (np.abs(y0 + (x - x0) * (y1 - y0) / (x1 - x0) - y) <= near)
+    return found
+
+
 def front_and_tail(depth: float, squares: float, distance: float) -> Polygon:
     """Outline of the paper's flow: a front at 45°, `squares` squares of side `depth`, a tail of three depths (§2.2).
 

@@ -425,7 +425,8 @@ class Simulation:
     @_one_thread_at_a_time
     def _captured(self, launches: Callable[[], None]) -> Any:
         """A graph of the launches, which replays for a hundredth of what they cost one by one."""
-        load_kernels(self.effects.module_name, self.device)
+        for name in self.effects.module_names:
+            load_kernels(name, self.device)
         with wp.ScopedCapture(device=self.device) as capture:
             launches()
         return capture.graph

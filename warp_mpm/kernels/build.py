@@ -45,7 +45,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     """Kernels for `effects`, and no others, in a Warp module of their own.
 
     Those over points stand in `of_kinds`, a namespace for each kind of material; those of the first, or only, one are
-    among the others too.
+    among the others too. Each further kind has a module to itself, as kernels of a module are told apart by name.
     """
     module = effects.module_name
     options: dict[str, Any] = {
@@ -55,7 +55,8 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     }
     if CHECKED:
         options["mode"] = "debug"
-    wp.set_module_options(options, module=wp.get_module(module))
+    for name in effects.module_names:
+        wp.set_module_options(options, module=wp.get_module(name))
     types = layout(effects)
     shapes = make_shape_functions(types)
     elementary = make_elementary(types)
@@ -65,16 +66,16 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     bodies = make_body_functions(types, elementary) if effects.bodies else None
     of_scheme = effects.scheme.kernels(types, tools, module)
     of_kinds = []
-    for of_kind in effects.of_kinds:
+    for of_kind, place in zip(effects.of_kinds, effects.module_names, strict=True):
         # The same structures for all kinds of material; what the kernels do with them is their own.
         own = SimpleNamespace(**types.__dict__ | {"effects": of_kind})
         own.law = SimpleNamespace(**law_functions(of_kind.skeleton, own, tools))
         pore = make_pore_pressure(own)
         of_kinds.append(
             SimpleNamespace(
-                **make_transfer(own, shapes, vectors, pore, bodies, module).__dict__,
-                **make_constitutive(own, shapes, vectors, pore, bodies, module).__dict__,
-                ledger=make_ledger(own, vectors, pore, module).ledger,
+                **make_transfer(own, shapes, vectors, pore, bodies, place).__dict__,
+                **make_constitutive(own, shapes, vectors, pore, bodies, place).__dict__,
+                ledger=make_ledger(own, vectors, pore, place).ledger,
                 **of_scheme,
             )
         )

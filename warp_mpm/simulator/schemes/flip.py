@@ -23,6 +23,7 @@ def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]
 
     F, V, Parameters = types.scalar, types.V, types.Parameters
     TWO_PHASE = types.effects.two_phase
+    MATERIALS = types.effects.materials
     of_phases, solid_of, liquid_of = tools.of_phases, tools.solid_of, tools.liquid_of
 
     @wp.func
@@ -38,9 +39,16 @@ def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]
             # What the grid does not see of v_L - v_S is damped by the drag like what it does see.
             decay = F(1.0) / (F(1.0) + parameters.drag_rate * time_step)
             unseen = own + increment - smooth
-            solid = solid_of(new)
-            liquid = solid + liquid_of(smooth) - solid_of(smooth) + decay * (liquid_of(unseen) - solid_of(unseen))
-            new = of_phases(solid, liquid)
+            if MATERIALS:
+                # The sum over the points of what the grid does not see is nil for each phase. Where the shares of the
+                # phases differ between points, each must therefore keep its own momentum.
+                lost = (F(1.0) - decay) * (liquid_of(unseen) - solid_of(unseen))
+                of_solid = F(1.0) / (F(1.0) + parameters.liquid_ratio)
+                new += of_phases((F(1.0) - of_solid) * lost, -of_solid * lost)
+            else:
+                solid = solid_of(new)
+                liquid = solid + liquid_of(smooth) - solid_of(smooth) + decay * (liquid_of(unseen) - solid_of(unseen))
+                new = of_phases(solid, liquid)
         return new
 
     return kept, gained
