@@ -23,6 +23,9 @@ LIKE = ("case_1", "set_iib", "set_iib_fixed")
 """Shipped scenes of these names alone, and the variants of case 1: the others have the effects of one of them, which
 `test_every_rule_names_an_effect_and_gives_a_reason` looks at in all."""
 
+LAW_ALONE = "case_1_mu_i"
+"""Has but for its law the effects of case 1; a run by that law is in tests/hard_cases/test_collection.py."""
+
 TRANSPORT = ["clear", "forget", "scatter", "move"]
 CONTACT = ["press", "join"]
 
@@ -71,7 +74,9 @@ def watched(monkeypatch):
 @pytest.mark.parametrize(
     "name",
     [
-        name if name in LIKE or name.startswith("case_1_") else pytest.param(name, marks=pytest.mark.slow)
+        name
+        if name in LIKE or (name.startswith("case_1_") and name != LAW_ALONE)
+        else pytest.param(name, marks=pytest.mark.slow)
         for name in SHIPPED
     ],
 )
@@ -238,9 +243,9 @@ def assert_equal_runs(first, second, tolerance):
 COARSE = {"numerics.spacing_m": 0.5, "output.end_time_s": 1.0}
 WITHOUT_INFLUENCE = {
     "yield stress far beyond reach": (
-        "case_1_dry",
+        "case_1_fixed",
         {"flow.material.cohesion_Pa": 1e12, "flow.material.tension_cutoff_Pa": 1e12, "barrier.friction": 0.0},
-        with_law(Scenario.load(SCENES / "case_1_dry.json"), "elastic") | {"barrier.friction": 0.0},
+        with_law(Scenario.load(SCENES / "case_1_fixed.json"), "elastic") | {"barrier.friction": 0.0},
         1e-9,
         1.0,
     ),
