@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -345,7 +346,11 @@ def test_the_calibrated_variant_gains_on_scenes_it_was_not_fitted_to() -> None:
 # --- command line ----------------------------------------------------------------------------------------------------
 
 
-def test_plan_collect_and_fit_on_the_command_line(tmp_path: Path) -> None:
+def test_plan_collect_and_fit_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("standard_errors", "cross_validated"):  # the slow ones, of the same table twice
+        once = cache(getattr(sweep_fit, name))
+        monkeypatch.setattr(sweep_fit, name, lambda runs, once=once: once(tuple(runs)))
+
     def call(*arguments: str) -> Any:
         return CliRunner().invoke(app, ["sweep", *arguments])
 

@@ -16,7 +16,6 @@ WORST = (
     "conductivity_1e-9",
     "courant_0.99",
     "friction_angle_0",
-    "mixture_viscosity_1e6",
     "mu_i_constant_0",
     "mud_exponent_0.2",
     "odd_spacing",

@@ -46,6 +46,7 @@ def test_what_was_measured_before_an_interrupt_is_kept_and_taken_over(tmp_path, 
         return Measured({"wall_time": 0.1 * len(run), "speed_ratio": 0.5})
 
     monkeypatch.setattr("warp_mpm.hard_cases.measure.measure", measured)
+    monkeypatch.setattr("warp_mpm.hard_cases.record.picture", lambda case, measured, path: path.touch())
     words = ("--quick", "--only", "one_point", "--only", "face_90", "--out", tmp_path)
     stopped = command(*words)
     assert stopped.exit_code == 130

@@ -190,10 +190,10 @@ def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
             if until == pytest.approx(0.52):  # between two snapshots
                 os.kill(os.getpid(), signal.SIGINT)
 
-    assert run(command, "--out", "whole").exit_code == 0
+    assert run(command, "--out", "whole", "--no-pictures").exit_code == 0
     with monkeypatch.context() as context:
         context.setattr(warp_mpm.simulation, "Simulation", Interrupted)
-        assert run(command, "--out", "here").exit_code == INTERRUPTED
+        assert run(command, "--out", "here", "--no-pictures").exit_code == INTERRUPTED
     assert command("run", "--resume", "here").exit_code == 0
     for name in (run_folder.TIME_SERIES, run_folder.SCENARIO):
         assert (Path("here") / name).read_bytes() == (Path("whole") / name).read_bytes()
@@ -202,7 +202,7 @@ def test_a_stopped_run_goes_on(command, monkeypatch, flying_points):
     assert record["status"] == "finished"
     assert record["resumed"][0]["simulated_time"] == pytest.approx(0.52)
     assert {item.name for item in Path("here").iterdir()} == set(run_folder.OWN_FILES)
-    again = command("run", "--resume", "here")
+    again = command("run", "--resume", "here", "--no-pictures")
     assert again.exit_code == 0
     assert again.stderr == "The run in here had finished before; nothing was left to simulate.\n"
 

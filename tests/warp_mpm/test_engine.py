@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from warp_mpm.engine import Processes, Standing, Task, cores
+from warp_mpm.engine import Ended, Processes, Standing, Task, cores
 from warp_mpm.results import Results
 from warp_mpm.sweep import SweepError, study
 
@@ -75,13 +75,22 @@ def test_whoever_breaks_off_leaves_nothing_running():
     assert left.exitcode == -signal.SIGTERM
 
 
+def in_this_process(self, tasks, *, on_start=lambda task: None, **rest):
+    """Starting a process takes longer than a case of the study; test_sweep.py has cases in processes of their own."""
+    for task in tasks:
+        on_start(task)
+        yield Ended(task, task.function(*task.arguments))
+
+
 @pytest.fixture(scope="module")
 def frame(tmp_path_factory):
     place = importlib.util.spec_from_file_location("parameter_study", ROOT / "docs/develop/parameter_study.py")
     script = importlib.util.module_from_spec(place)
     place.loader.exec_module(script)
     folder = tmp_path_factory.mktemp("study") / "study"
-    return script.main(folder, spacing=1.0, until=0.4), folder, script
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Processes, "run", in_this_process)
+        return script.main(folder, spacing=1.0, until=0.4), folder, script
 
 
 def test_study_is_a_table_of_key_figures(frame):

@@ -93,6 +93,7 @@ def code_digest(modules: Sequence[str]) -> str:
     return digest.hexdigest()[:12]
 
 
+@cache
 def code_text(source: str, *, schema: bool) -> str:
     """Source code without comments and docstrings and, in the schema's classes, without declarations of fields."""
     tree = ast.parse(source)
