@@ -322,7 +322,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
-        ratio = coming.pore_pressure_ratio
+        ratio: float | Array | None = coming.pore_pressure_ratio
         if ratio is None:
             ratio = flow.pore_pressure_ratio(np.full(len(coming.volume), flow.inflow.x_m))
         slope = np.full(len(coming.volume), flow.inflow.slope)
