@@ -67,14 +67,6 @@ def scenes(formulations, precisions, transfers):
                 "cohesion_Pa": cohesion,
                 "tension_cutoff_Pa": draw(st.sampled_from([0.0, 0.5])) * cohesion,
             }
-            if draw(st.booleans()):
-                material["dilatancy_angle_deg"] = 0.0
-                material["dilatancy"] = {
-                    # Loose or dense by what soils are, and by what none is.
-                    "critical_solid_fraction": min(max(1.0 - material["porosity"] + draw(pick(-0.3, 0.3)), 0.01), 0.99),
-                    "coefficient": draw(zero_or(-1, 2)),
-                    "grain_diameter_m": draw(logarithmic(-5, 0)),
-                }
         if law == "coulomb_viscous":
             material["mixture_viscosity_Pa_s"] = draw(zero_or(-3, 6))
         if law == "herschel_bulkley":
@@ -92,6 +84,15 @@ def scenes(formulations, precisions, transfers):
                 "inertial_constant": draw(zero_or(-3, 1)),
                 "grain_diameter_m": draw(logarithmic(-5, 0)),
                 "fluid_viscosity_Pa_s": draw(st.one_of(st.none(), zero_or(-3, 3))),
+            }
+        if law != "herschel_bulkley" and draw(st.booleans()):
+            if law != "mu_i":
+                material["dilatancy_angle_deg"] = 0.0
+            material["dilatancy"] = {
+                # Loose or dense by what soils are, and by what none is.
+                "critical_solid_fraction": min(max(1.0 - material["porosity"] + draw(pick(-0.3, 0.3)), 0.01), 0.99),
+                "coefficient": draw(zero_or(-1, 2)),
+                "grain_diameter_m": draw(logarithmic(-5, 0)),
             }
         wet = ["liquid_density_kg_per_m3", "liquid_bulk_modulus_Pa", "cavitation_pressure_Pa"]
         drained = ["hydraulic_conductivity_m_per_s", "intrinsic_permeability_m2", "liquid_viscosity_Pa_s"]

@@ -18,13 +18,16 @@ from warp_mpm.simulator.laws import dilatancy
 from warp_mpm.simulator.laws.law import all_functions
 
 TIME_STEP, RATE, PRESSURE = 1e-4, 10.0, 5e3
+GRAINS = {"static_friction": 0.35, "dynamic_friction": 0.7, "grain_diameter_m": 0.05}
 OWN = {"critical_solid_fraction": 0.56, "coefficient": 1.5, "grain_diameter_m": 2e-3}
 
 
 def scene(load_scene, *, law="mohr_coulomb", own=OWN, **material):
     """Case 1 with dilatancy; coefficient None is none."""
     base = load_scene("case_1")
-    if law != "mohr_coulomb":
+    if law == "mu_i":
+        base = base.replaced(with_law(base, law, **GRAINS))
+    elif law != "mohr_coulomb":
         base = base.replaced(with_law(base, law, friction_angle_deg=20.0, mixture_viscosity_Pa_s=30.0))
     changes = {f"flow.material.{name}": value for name, value in material.items()}
     return base.replaced(changes | {"flow.material.dilatancy": own})
@@ -188,6 +191,38 @@ def test_sheared_at_its_volume_a_loose_soil_loses_its_pressure_and_a_dense_one_g
     assert pressure[0] == pytest.approx(exact, rel=2e-3)
 
 
+@pytest.mark.parametrize("fraction", [0.46, 0.53, 0.60, 0.66])
+@pytest.mark.parametrize("viscosity", [0.1, 20.0])
+def test_friction_that_grows_with_the_rate_dilates_too(load_scene, element, fraction, viscosity):
+    """dp/dt = K tan ψ γ̇_p, dτ/dt = G (γ̇ - γ̇_p), where γ̇_p is such that τ = p (μ(γ̇_p, p) + tan ψ)."""
+    soil = element(scene(load_scene, law="mu_i", liquid_viscosity_Pa_s=viscosity))
+    material = soil.material
+    g, k = material.shear_modulus, material.bulk_modulus
+
+    def ratio(rate, p):
+        inertia = material.grain_density_kg_per_m3 * (rate * material.grain_diameter_m) ** 2 / p
+        number = math.sqrt(inertia + viscosity * rate / (0.635 * p))
+        mu = 0.35 + 0.35 * number / (number + material.inertial_constant)
+        return max(mu + tangent(material, fraction, p), 0.0)
+
+    def slope(_, state):
+        p, tau = max(state[0], 1e-3), state[1]
+        slip = 0.0
+        if tau > ratio(0.0, p) * p:
+            slip = brentq(lambda rate: ratio(rate, p) * p - tau, 0.0, 1e5) if tau < ratio(1e5, p) * p else 1e5
+        return [k * tangent(material, fraction, p) * slip, g * (RATE - slip)]
+
+    steps, strain = 4000, 0.01
+    bears = PRESSURE * ratio(RATE, PRESSURE)
+    exact = solve_ivp(slope, (0.0, strain / RATE), [PRESSURE, bears], method="LSODA", rtol=1e-8, atol=1e-6).y[:, -1]
+    start = [bears - PRESSURE, -bears - PRESSURE, -PRESSURE, 0.0]
+    found, _ = soil.run(start, fraction, steps=steps, time_step=strain / RATE / steps)
+    pressure, shear = in_plane(found)
+    assert abs(exact[0] - PRESSURE) > 0.01 * PRESSURE
+    # First order in the step.
+    np.testing.assert_allclose([pressure[0], shear[0]], exact, rtol=5e-3, atol=1.0)
+
+
 @pytest.mark.parametrize("fraction", [0.48, 0.64])
 def test_drained_it_goes_to_the_critical_solid_fraction(load_scene, element, fraction):
     """dm/dγ = -c m (m - m_crit) has m_crit / (1 - (1 - m_crit/m_0) e^(-c m_crit γ)); without viscosity."""
@@ -205,7 +240,7 @@ def test_drained_it_goes_to_the_critical_solid_fraction(load_scene, element, fra
 def test_without_a_coefficient_it_is_the_law_alone(load_scene, element):
     generator = np.random.default_rng(5)
     stress = generator.normal(0.0, 2e4, (300, 4)) - [1e4, 1e4, 1e4, 0.0]
-    for law in ("mohr_coulomb", "coulomb_viscous"):
+    for law in ("mohr_coulomb", "coulomb_viscous", "mu_i"):
         plain, none = (
             element(scene(load_scene, law=law, own=own)).run(stress, 0.5)[0] for own in (None, OWN | {"coefficient": 0})
         )

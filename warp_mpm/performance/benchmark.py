@@ -63,6 +63,7 @@ def law_costs(base: Scenario, *, device: str, progress: Progress) -> Table:
     scene = base.replaced(SHORT)
     named = {law: scene.replaced(with_law(scene, law, **own)) for law, own in OWN_FIELDS.items()}
     named["mohr_coulomb, dilatancy"] = scene.replaced({"flow.material.dilatancy": {"critical_solid_fraction": 0.56}})
+    named["mu_i, dilatancy"] = named["mu_i"].replaced({"flow.material.dilatancy": {"critical_solid_fraction": 0.56}})
     named["mohr_coulomb, inertial drag"] = scene.replaced({"flow.material.inertial_drag_coefficient": 0.4})
     clock, steppers = clock_of(device), []
     for name, each in named.items():

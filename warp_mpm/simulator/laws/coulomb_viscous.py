@@ -109,9 +109,9 @@ class CoulombViscous(Law):
             slope = parameters.cone_slope
             limit = parameters.tension_limit
             if DILATANCY:
-                strength = parameters.cone_strength
+                strength, sine = parameters.cone_strength, parameters.friction_sine
                 pressure, slope = swollen(
-                    points, p, -mean, shear, strength, stiffness, gradient, volume, time_step, parameters
+                    points, p, -mean, shear, strength, sine, stiffness, gradient, volume, time_step, parameters
                 )
                 dilated = -pressure
                 limit = smaller(limit, strength / larger(slope, F(1.0e-6)))

@@ -38,7 +38,7 @@ class Dilatancy(Model):
 
 
 CONSTANTS = ("friction_sine", "dilatancy_coefficient", "critical_solid_fraction", "shear_inertia", "fluid_viscosity")
-"""Numbers that the function below reads from the parameters."""
+"""Numbers that the function below reads from the parameters, and the sine of φ at rest."""
 
 
 def numbers(material: Any, law: Law) -> dict[str, float]:
@@ -54,7 +54,10 @@ def numbers(material: Any, law: Law) -> dict[str, float]:
 
 
 def fluid_viscosity(material: Any) -> float:
-    """Of the liquid in the voids [Pa s]; 0 of air."""
+    """Of what is in the voids [Pa s]: the law's own, or the liquid's; 0 of air."""
+    own = getattr(material, "fluid_viscosity_Pa_s", None)
+    if own is not None:
+        return float(own)
     if not hasattr(material, "liquid_density_kg_per_m3"):
         return 0.0
     return float(getattr(material, "liquid_viscosity_Pa_s", WATER_VISCOSITY))
@@ -85,8 +88,14 @@ def greatest_angle(material: Any, angle: float) -> float:
     return min(angle + math.atan(min(own.coefficient, STEEPEST)), 0.5 * math.pi)
 
 
-def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleNamespace:
-    """Build the function `dilated`, what dilatancy makes of the pressure and of the friction in a step."""
+def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace, *, added: bool = False) -> SimpleNamespace:
+    """Build the functions `dilated`, what dilatancy makes of the pressure and of the friction in a step, and
+    `tangent_at`, tan ψ at a pressure.
+
+    Args:
+        types, tools: as `Law.functions` has them.
+        added: the friction is sin φ + tan ψ, in place of sin(φ + ψ).
+    """
     import warp as wp
 
     F, V4, Points, Parameters = types.scalar, types.V4, types.Points, types.Parameters
@@ -106,13 +115,32 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
         falls = wp.where(kept == free, slope, F(0.0))
         return kept, wp.where(pressure > F(0.0), falls, F(0.0))
 
+    ADDED = added
+
     @wp.func
     def inclined(tangent_psi: F, sine: F, cosine: F):
-        """Sine of φ + ψ, between none and a right angle."""
+        """Sine of φ + ψ, between none and a right angle; or both added, and none at the least."""
+        if wp.static(ADDED):
+            return larger(sine + tangent_psi, F(0.0))
         inverse = F(1.0) / wp.sqrt(F(1.0) + tangent_psi * tangent_psi)
         within = larger((sine + cosine * tangent_psi) * inverse, F(0.0))
         greatest = F(wp.static(GREATEST_SINE))
         return wp.where(cosine > sine * tangent_psi, smaller(within, greatest), greatest)
+
+    @wp.func
+    def sheared_state(points: Points, p: wp.int32, gradient: V4, volume: F, parameters: Parameters):
+        """Solid fraction, ρ_grain (γ̇ δ)² [Pa] and √(η_f γ̇) [√Pa] of a point."""
+        stretch = gradient[0] - gradient[3]
+        sheared = gradient[1] + gradient[2]
+        rate = wp.sqrt(stretch * stretch + sheared * sheared)
+        m = parameters.grain_share * read(points.reference_volume, p) / volume
+        return m, parameters.shear_inertia * rate * rate, wp.sqrt(parameters.fluid_viscosity * rate)
+
+    @wp.func
+    def tangent_at(points: Points, p: wp.int32, pressure: F, gradient: V4, volume: F, parameters: Parameters) -> F:
+        m, inertia, viscous = sheared_state(points, p, gradient, volume, parameters)
+        psi, _change = tangent(m, pressure, inertia, viscous, parameters)
+        return psi
 
     @wp.func
     def dilated(
@@ -121,6 +149,7 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
         pressure: F,
         shear: F,
         cohesion: F,
+        sine: F,
         stiffness: F,
         gradient: V4,
         volume: F,
@@ -138,20 +167,15 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
             pressure: of the trial stress, compression positive.
             shear: of the trial stress.
             cohesion: shear that is borne without pressure.
+            sine: of φ, the friction without dilatancy.
             stiffness: shear stress per rate of plastic shear: G Δt, and the viscosity of the law [Pa s].
             gradient: of the velocity [1/s].
             volume: of the point at the end of the step [m³/m].
             time_step: Δt.
             parameters: of the material.
         """
-        sine = parameters.friction_sine
-        cosine = wp.sqrt(F(1.0) - sine * sine)
-        stretch = gradient[0] - gradient[3]
-        sheared = gradient[1] + gradient[2]
-        rate = wp.sqrt(stretch * stretch + sheared * sheared)
-        m = parameters.grain_share * read(points.reference_volume, p) / volume
-        inertia = parameters.shear_inertia * rate * rate
-        viscous = wp.sqrt(parameters.fluid_viscosity * rate)
+        cosine = wp.sqrt(larger(F(1.0) - sine * sine, F(0.0)))
+        m, inertia, viscous = sheared_state(points, p, gradient, volume, parameters)
         gain = parameters.bulk_modulus * time_step / larger(stiffness, tiny)
         excess = shear - cohesion
         steepest, _none = tangent(m, F(0.0), inertia, viscous, parameters)
@@ -177,4 +201,4 @@ def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace) -> SimpleName
                 friction = inclined(psi, sine, cosine)
         return at, friction
 
-    return SimpleNamespace(dilated=dilated)
+    return SimpleNamespace(dilated=dilated, tangent_at=tangent_at)

@@ -147,6 +147,7 @@ def _make_dilatant(types: SimpleNamespace, tools: SimpleNamespace) -> Any:
             pressure,
             F(0.5) * (first - last),
             F(0.5) * parameters.cohesion_term,
+            parameters.friction_sine,
             g * time_step,
             gradient,
             volume,

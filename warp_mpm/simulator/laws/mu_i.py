@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from warp_mpm.schema import Model, NonNegative
 
+from .dilatancy import STEEPEST, make_dilatancy
 from .law import Array, Law
 from .radial import TINY, lateral_range, make_radial, mean_and_shear
 
@@ -49,16 +50,18 @@ class Settings(Model):
 
 class MuI(Law):
     """τ ≤ μ p', μ = μ_s + (μ_2 - μ_s) / (1 + I_0 / I), with τ = √(s : s / 2), p' the mean effective pressure and
-    γ̇ = √(2 e : e) (Jop, Forterre and Pouliquen 2006); elastic below μ_s p', and without dilatancy.
+    γ̇ = √(2 e : e) (Jop, Forterre and Pouliquen 2006); elastic below μ_s p'.
 
     In a liquid I² becomes I² + J / α (Trulsson et al. 2012): inertia rules at a Stokes number
-    ρ_grain d² γ̇ / η_f = I² / J far above 1 / α, the liquid far below. The way back is implicit.
+    ρ_grain d² γ̇ / η_f = I² / J far above 1 / α, the liquid far below. The way back is implicit. With a dilatancy the
+    friction is μ + tan ψ (Pailha and Pouliquen 2009).
     """
 
     name = "mu_i"
     title = "friction μ(I) that grows with the inertial number, in a liquid with the viscous one too"
     Settings = Settings
     opens = True
+    dilates = True
     constants = ("static_friction", "friction_growth", "inertial_rate", "viscous_rate")
 
     def numbers(self, material: Any) -> dict[str, float]:
@@ -75,13 +78,16 @@ class MuI(Law):
     def bears_tension(self, material: Any) -> bool:
         return False
 
+    def friction(self, material: Any) -> float:
+        return material.static_friction
+
     def lateral_stress_ratio(self, material: Any) -> float:
         """Jaky's 1 - sin φ' with tan φ' = μ_s, or what the law allows."""
-        jaky = 1.0 - math.sin(math.atan(material.static_friction))
-        return max(jaky, lateral_range(1.0, 0.0, material.static_friction)[0])
+        jaky = 1.0 - math.sin(math.atan(_at_rest(material)))
+        return max(jaky, lateral_range(1.0, 0.0, _at_rest(material))[0])
 
     def lateral_stress_range(self, material: Any, vertical: float) -> tuple[float, float]:
-        return lateral_range(vertical, 0.0, material.static_friction)
+        return lateral_range(vertical, 0.0, _at_rest(material))
 
     def grain_diameter(self, material: Any) -> float | None:
         return material.grain_diameter_m
@@ -118,7 +124,10 @@ class MuI(Law):
 
     def yield_excess(self, material: Any, stress: Array) -> Array:
         mean, shear = mean_and_shear(stress)
-        return mean.clip(min=shear + material.dynamic_friction * mean)
+        most = material.dynamic_friction
+        if material.dilatancy is not None:
+            most += min(material.dilatancy.coefficient, STEEPEST)
+        return mean.clip(min=shear + most * mean)
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
         import warp as wp
@@ -128,7 +137,9 @@ class MuI(Law):
         radial = make_radial(types)
         parted, joined = radial.parted, radial.joined
         tiny = wp.constant(F(TINY))
-        WET = types.effects.liquid
+        WET, DILATANCY = types.effects.liquid, types.effects.dilatancy
+        of_density = make_dilatancy(types, tools, added=True) if DILATANCY else SimpleNamespace()
+        swollen, tangent_at = getattr(of_density, "dilated", None), getattr(of_density, "tangent_at", None)
 
         @wp.func
         def root(excess: F, stiffness: F, growth: F, half: F) -> F:
@@ -176,18 +187,59 @@ class MuI(Law):
             return rate
 
         @wp.func
-        def back(
-            points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters
-        ):
-            mean, shear = parted(stress)
-            borne = smaller(mean, F(0.0))
-            static = smaller(shear, -parameters.static_friction * borne)
+        def bounded(shear: F, borne: F, friction: F, time_step: F, parameters: Parameters) -> F:
+            """Shear stress at the end of a step at a mean stress, at most 0, with a friction at rest."""
+            static = smaller(shear, -friction * borne)
             growth = -parameters.friction_growth * borne
             stiffness = parameters.shear_modulus * time_step
             half = parameters.inertial_rate * wp.sqrt(-borne)
             rate = flow_rate(shear - static, stiffness, growth, half, parameters)
             # What rounds is kept between the bounds of the friction.
-            allowed = larger(static, smaller(shear - stiffness * rate, static + growth))
-            return joined(stress, mean, borne, allowed / larger(shear, tiny)), (mean - borne) / parameters.bulk_modulus
+            return larger(static, smaller(shear - stiffness * rate, static + growth))
+
+        @wp.func
+        def back(
+            points: Points, p: wp.int32, stress: V4, gradient: V4, volume: F, time_step: F, parameters: Parameters
+        ):
+            mean, shear = parted(stress)
+            dilated = mean
+            friction = parameters.static_friction
+            if DILATANCY:
+                # What grows with the rate is a viscosity to the pressure: that of the rate at the trial stress.
+                held = smaller(mean, F(0.0))
+                psi = tangent_at(points, p, -held, gradient, volume, parameters)
+                slow = larger(friction + psi, F(0.0))
+                reached = bounded(shear, held, slow, time_step, parameters)
+                stiffness = parameters.shear_modulus * time_step
+                rate = (shear - reached) / stiffness
+                stiffness += larger(reached - smaller(shear, -slow * held), F(0.0)) / larger(rate, tiny)
+                pressure, inclined = swollen(
+                    points,
+                    p,
+                    -mean,
+                    shear,
+                    F(0.0),
+                    friction,
+                    stiffness,
+                    gradient,
+                    volume,
+                    time_step,
+                    parameters,
+                )
+                dilated = -pressure
+                friction = inclined
+            borne = smaller(dilated, F(0.0))
+            allowed = bounded(shear, borne, friction, time_step, parameters)
+            opened = (dilated - borne) / parameters.bulk_modulus
+            return joined(stress, mean, borne, allowed / larger(shear, tiny)), opened
 
         return {"back": back}
+
+
+def _at_rest(material: Any) -> float:
+    """Friction at rest [-], with what dilatancy adds to it."""
+    if material.dilatancy is None:
+        return material.static_friction
+    own = material.dilatancy
+    free = own.coefficient * (1.0 - material.porosity - own.critical_solid_fraction)
+    return max(material.static_friction + min(max(free, -STEEPEST), STEEPEST), 0.0)
