@@ -675,7 +675,8 @@ class Simulation:
 
         `position`, `solid_velocity`, `liquid_velocity` [N, 2] (the last with two phases only); `effective_stress`
         [N, 4] (xx, yy, zz, xy, tension positive); `pore_pressure` (compression positive; not if dry), `porosity`,
-        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N]. What the law or the transfer scheme
+        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N], and `material` where there are
+        several. What the law or the transfer scheme
         keeps at a point besides, and has a meaning for, comes when it is named. In space vectors are [N, 3], and
         stresses [N, 6] (yz and xz besides).
         """
@@ -707,6 +708,8 @@ class Simulation:
             "liquid_mass": lambda: self._liquid_mass[inside],
             "porosity": porosity,
         }
+        if len(self._of_materials) > 1:
+            quantities["material"] = lambda: self._material[inside].astype(np.float64)
         if self.effects.two_phase:
             quantities["liquid_velocity"] = lambda: stored("velocity")[:, self.effects.dimensions :]
         if self.effects.liquid:
