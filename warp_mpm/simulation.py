@@ -37,7 +37,7 @@ from .state import saved
 from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
-from .state.parameters import kernel_parameters
+from .state.parameters import kernel_parameters, tell_nodes
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
@@ -244,6 +244,7 @@ class Simulation:
             )
             for place in range(len(scenario.flow.materials))
         ]
+        tell_nodes(self._of_materials, self._types)
         self._parameters = self._of_materials[0]
         self._kinds = [
             self.effects.kinds.index(kind_of(material)) if self.effects.kinds else 0

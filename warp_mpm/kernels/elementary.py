@@ -19,7 +19,8 @@ def make_elementary(types: SimpleNamespace) -> SimpleNamespace:
     `smaller(a, b)`, `logarithm(x)` and `exponential(x)`. In an array of two dimensions p counts through, row by row."""
     F = types.scalar
     forms = {number: ("array.data[p] = value;", "wp::atomic_add(&array.data[p], value);") for number in (F, wp.int32)}
-    for vector in (types.V2, types.V4, types.V, types.S, types.P, types.X, types.T, types.G):
+    vectors = (types.V2, types.V4, types.V, types.S, types.P, types.X, types.T, types.G)
+    for vector in (*vectors, types.M) if types.told else vectors:
         each = f"for (int k = 0; k < {vector._length_}; ++k) "
         forms[vector] = (
             each + "array.data[p].c[k] = value.c[k];",
