@@ -172,7 +172,7 @@ def make_transfer(
         force_y = of_phases(face_y(stress, solid_pressure, push), on_y(liquid_force))
         if TOLD:
             tells = parameters.tells
-            excess = parameters.excess
+            telling = parameters.excess
             if TOLD_DRAG:
                 # All of it, and its change with the porosity.
                 tells = 1
@@ -184,9 +184,9 @@ def make_transfer(
                     own_drag *= resisting
                     if TOLD_BEYOND:
                         own_beyond *= wp.sqrt(resisting)
-                excess[wp.static(DRAG_AT)] = own_drag
+                telling[wp.static(DRAG_AT)] = own_drag
                 if TOLD_BEYOND:
-                    excess[wp.static(BEYOND_AT)] = own_beyond
+                    telling[wp.static(BEYOND_AT)] = own_beyond
         momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
@@ -227,7 +227,7 @@ def make_transfer(
                     add(grid.mass, node, wy[m] * column_mass)
                     if TOLD:
                         if tells == 1:
-                            add(grid.told, node, (wy[m] * column_mass) * excess)
+                            add(grid.told, node, (wy[m] * column_mass) * telling)
                     if DRAG:
                         # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that changes.
                         ratio = n / parameters.porosity
