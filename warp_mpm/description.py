@@ -8,6 +8,7 @@ import numpy as np
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
 from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario.flow import formulation_of
 from warp_mpm.scenario.inflow import surges_of
 
 
@@ -91,6 +92,11 @@ def _arriving(scenario: Scenario) -> list[str]:
         words.append(
             f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of {flow.deposited_volume:.4g} m³/m"
         )
+        words += [
+            f"deposit {number} {formulation_of(own).replace('_', '-')}, {own.law}, {own.density:,.0f} kg/m³"
+            for number, own in enumerate(map(flow.material_of, flow.deposits))
+            if own != flow.material
+        ]
     return ["; ".join(words)] if words else []
 
 

@@ -122,6 +122,15 @@ class Effects:
         return [LAWS.keyed(key) for key in dict.fromkeys([kind.law for kind in self.kinds] or [self.law])]
 
     @property
+    def told_to_nodes(self) -> tuple[str, ...]:
+        """What points of other materials than the flow's tell the nodes: of what nodes otherwise know, per mass of the
+        solid, from the scene."""
+        if not self.materials:
+            return ()
+        of_phases = ("liquid", "drag", *(["drag_beyond"] if self.inertial_drag else [])) if self.two_phase else ()
+        return (*of_phases, *(["filling"] if self.liquid_alone else []))
+
+    @property
     def partly_dry(self) -> bool:
         """Some points hold liquid and some do not."""
         return self.liquid and any(not kind.wet for kind in self.kinds)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from warp_mpm.quantities.points import DRAWN, Drawn
 from warp_mpm.results import Snapshot
+from warp_mpm.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -25,13 +26,21 @@ def field_named(name: str) -> Drawn:
     return DRAWN[name]
 
 
-def field_values(snapshot: Snapshot, name: str, solid_density: float) -> Array | None:
+def solid_density_of(scenario: Scenario, snapshot: Snapshot) -> float | Array:
+    """Initial mass of solid per volume of the whole [kg/m³]: of all, or of each point [N] where materials differ."""
+    if "material" not in snapshot:
+        return scenario.flow.material.solid_partial_density
+    known = np.array([material.solid_partial_density for material in scenario.flow.materials])
+    return known[snapshot["material"].astype(int)]
+
+
+def field_values(snapshot: Snapshot, name: str, solid_density: float | Array) -> Array | None:
     """Values [N] of a field, in the unit in which it is shown; None where the run has no such field.
 
     Args:
         snapshot: of N points.
         name: of a field.
-        solid_density: initial mass of solid per volume of the whole [kg/m³].
+        solid_density: initial mass of solid per volume of the whole [kg/m³]; from `solid_density_of`.
     """
     field = DRAWN[name]
     if any(need not in snapshot for need in field.needs):

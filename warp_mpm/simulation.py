@@ -37,7 +37,7 @@ from .state import saved
 from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
-from .state.parameters import kernel_parameters
+from .state.parameters import kernel_parameters, tell_nodes
 from .state.samples import BarrierNow, Now, Window, mean_forces, sampled_quantities, wanted_quantities
 from .time_step import ONE_TIME, nominal_step, step_limits
 
@@ -244,6 +244,7 @@ class Simulation:
             )
             for place in range(len(scenario.flow.materials))
         ]
+        tell_nodes(self._of_materials, self._types)
         self._parameters = self._of_materials[0]
         self._kinds = [
             self.effects.kinds.index(kind_of(material)) if self.effects.kinds else 0
@@ -688,7 +689,8 @@ class Simulation:
 
         `position`, `solid_velocity`, `liquid_velocity` [N, 2] (the last with two phases only); `effective_stress`
         [N, 4] (xx, yy, zz, xy, tension positive); `pore_pressure` (compression positive; not if dry), `porosity`,
-        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N]. What the law or the transfer scheme
+        `deviatoric_strain` (cumulative), `volume`, `solid_mass`, `liquid_mass` [N], and `material` where there are
+        several. What the law or the transfer scheme
         keeps at a point besides, and has a meaning for, comes when it is named. In space vectors are [N, 3], and
         stresses [N, 6] (yz and xz besides).
         """
@@ -720,6 +722,8 @@ class Simulation:
             "liquid_mass": lambda: self._liquid_mass[inside],
             "porosity": porosity,
         }
+        if len(self._of_materials) > 1:
+            quantities["material"] = lambda: self._material[inside].astype(np.float64)
         if self.effects.two_phase:
             quantities["liquid_velocity"] = lambda: stored("velocity")[:, self.effects.dimensions :]
         if self.effects.liquid:

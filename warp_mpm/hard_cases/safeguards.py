@@ -110,9 +110,6 @@ KNOWN_LIMITS = (
     "pressed until its voids are closed, in up to a third of the points and steps of `dry_soft_45`; the grains' own "
     "stiffness is not in the model. The run stays stable and its energy closed; single points overshoot the stress "
     "behind the shock, up to 2.7 times in random scenes.",
-    "A dry flow onto a wet deposit cannot be stated: a deposit may have a skeleton of its own, but has the flow's "
-    "densities, porosity and conductivity. It would take sums at the nodes of what are constants of the scene (mass "
-    "of liquid and drag per mass), and nodes at which the liquid is there for one body and not for the other.",
     "Bit-for-bit continuation is promised on the processor only: on a GPU sums have no fixed order.",
 )
 """Found by the collection and not mended."""

@@ -82,8 +82,7 @@ def make_constitutive(
     DENSITY = effects.density_correction
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
-    PARTLY_DRY = types.partly_dry
-    WET = S._length_ - 1
+    PARTLY_DRY = "corner_wet" in types.grid_fields and LIQUID
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields and TWO_PHASE
     SOLID_GAP = effects.smoothing_grid and OPENS
     LIQUID_GAP = effects.smoothing_grid and effects.liquid
@@ -182,7 +181,7 @@ def make_constitutive(
                         smooth += share * corner
                         if PARTLY_DRY:
                             # Beside what is dry the liquid has a free surface.
-                            least_filling = smaller(corner[wp.static(WET)], least_filling)
+                            least_filling = smaller(read(grid.corner_wet, place), least_filling)
                         else:
                             least_filling = smaller(corner[0], least_filling)
             if RELAXATION:

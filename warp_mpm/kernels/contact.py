@@ -29,6 +29,7 @@ from .layout import (
     SLOT_SIZE,
     TIME_STEP,
 )
+from .told import make_told
 
 SWEEPS = 4
 """Sweeps of a step. Two or forty change the sliding distance of the paper's case 1 by 0.1 %."""
@@ -82,7 +83,10 @@ def make_contact(
     DIMENSIONS = types.dimensions
     SPATIAL = DIMENSIONS == 3
     AROUND = NODES[DIMENSIONS]
-    MATERIALS = effects.materials
+    MATERIALS = "told" in types.grid_fields
+    told_of = make_told(types)
+    ratio_of_liquid, ratio_of_filling = told_of.ratio_of_liquid, told_of.ratio_of_filling
+    told_drag = told_of.drag_per_mass
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
@@ -104,7 +108,7 @@ def make_contact(
         result = F(0.0)
         total = F(0.0)
         if MATERIALS:
-            liquid_mass = F(0.0)
+            of_liquid = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
         for k in range(AROUND):
@@ -115,17 +119,18 @@ def make_contact(
                     result += w * w / mass
                     total += w
                     if MATERIALS:
+                        told = read(grid.told, node) / mass
                         if TWO_PHASE:
-                            liquid_mass += w * read(grid.liquid_mass, node) / mass
-                            drag += w * read(grid.drag, node) / mass
+                            of_liquid += w * ratio_of_liquid(told, parameters)
+                            drag += w * told_drag(told, parameters)
                         if CARRIED:
-                            filling += w * read(grid.filling, node) / mass
+                            filling += w * ratio_of_filling(told, parameters)
         if MATERIALS:
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
             if TWO_PHASE:
-                contact.liquid_ratio[e] = larger(liquid_mass * inverse_total, F(wp.static(WEIGHTLESS)))
+                contact.liquid_ratio[e] = larger(of_liquid * inverse_total, F(wp.static(WEIGHTLESS)))
                 if FRICTION:
                     contact.drag_per_mass[e] = drag * inverse_total
             if CARRIED:

@@ -26,7 +26,8 @@ def make_elementary(types: SimpleNamespace) -> SimpleNamespace:
 def _make(types: SimpleNamespace) -> SimpleNamespace:
     F = types.scalar
     forms = {number: ("array.data[p] = value;", "wp::atomic_add(&array.data[p], value);") for number in (F, wp.int32)}
-    for vector in (types.V2, types.V4, types.V, types.S, types.P, types.X, types.T, types.G):
+    vectors = (types.V2, types.V4, types.V, types.S, types.P, types.X, types.T, types.G)
+    for vector in (*vectors, types.M) if types.told else vectors:
         each = f"for (int k = 0; k < {vector._length_}; ++k) "
         forms[vector] = (
             each + "array.data[p].c[k] = value.c[k];",

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from .layout import BLOCK, TIME_STEP
+from .told import make_told
 
 
 def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module: str) -> SimpleNamespace:
@@ -18,10 +19,12 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
     TWO_PHASE = effects.two_phase
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     INERTIAL_DRAG = effects.inertial_drag
-    MATERIALS = "liquid_mass" in types.grid_fields
+    MATERIALS = "liquid" in types.told
+    told_of = make_told(types)
+    ratio_of_liquid, drag_per_mass = told_of.ratio_of_liquid, told_of.drag_per_mass
+    drag_beyond_per_mass = told_of.drag_beyond_per_mass
     POROSITY = effects.porosity_update
     BEYOND = "drag_beyond" in types.grid_fields
-    LIQUID = types.dimensions  # the first of the liquid's entries in a V
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
     LIQUID_ALONE = effects.liquid_alone
     per_phase, of_phases = vectors.per_phase, vectors.of_phases
@@ -37,9 +40,9 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
         return per_phase(solid, liquid)
 
     @wp.func
-    def per_masses(mass: F, liquid_mass: F) -> V:
-        """The same where the nodes have the mass of each phase; 0 for a liquid that is not there."""
-        return per_phase(F(1.0) / mass, wp.where(liquid_mass > F(0.0), F(1.0) / liquid_mass, F(0.0)))
+    def per_masses(mass: F, ratio: F) -> V:
+        """The same with the liquid's mass over the solid's; 0 for a liquid that is not there."""
+        return per_phase(F(1.0) / mass, wp.where(ratio > F(0.0), F(1.0) / (ratio * mass), F(0.0)))
 
     @wp.func
     def dragged(free: V, ratio: F, rate: F, rate_beyond: F, time_step: F) -> V:
@@ -80,8 +83,9 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
                     if MATERIALS:
-                        liquid_mass = grid.liquid_mass[i, j]
-                        inverse = per_masses(mass, liquid_mass)
+                        told = grid.told[i, j] / mass
+                        ratio = ratio_of_liquid(told, parameters)
+                        inverse = per_masses(mass, ratio)
                     else:
                         inverse = per_mass(mass, parameters)
                     old = wp.cw_mul(inverse, grid.velocity[i, j])
@@ -92,14 +96,14 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                         else:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if MATERIALS:
-                        # Drag of the node [kg/s] over the mass of each phase; without liquid there is none.
-                        both = inverse[0] + inverse[wp.static(LIQUID)]
-                        beyond = F(0.0)
-                        if INERTIAL_DRAG:
-                            beyond = grid.drag_beyond[i, j] * both
-                        new = dragged(new, liquid_mass / mass, grid.drag[i, j] * both, beyond, time_step)
-                        if liquid_mass == F(0.0):
-                            # What has no mass goes with the solid, for whom it concerns.
+                        if ratio > F(0.0):
+                            both = F(1.0) + F(1.0) / ratio
+                            beyond = F(0.0)
+                            if INERTIAL_DRAG:
+                                beyond = drag_beyond_per_mass(told, parameters) * both
+                            new = dragged(new, ratio, drag_per_mass(told, parameters) * both, beyond, time_step)
+                        else:
+                            # What has no mass goes with the solid.
                             old = of_phases(solid_of(old), solid_of(old))
                             new = of_phases(solid_of(new), solid_of(new))
                     elif TWO_PHASE:

@@ -188,9 +188,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     G = wp.types.vector(dimensions**2, scalar)
     R = scalar if dimensions == 2 else X
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
-    # Where some points are dry, the volume of the others last; the liquid's sums are then over those.
-    sums = {"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation]
-    S = wp.types.vector(sums + 1 if effects.partly_dry else sums, scalar)
+    S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     P = wp.types.vector(PIECE, scalar)
     array = wp.array
     types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
@@ -238,17 +236,16 @@ def layout(effects: Effects) -> SimpleNamespace:
         "active": array(dtype=wp.int32),
         "active_count": array(dtype=wp.int32),
     }
-    if effects.materials and effects.two_phase:
-        grid["liquid_mass"] = array(dtype=scalar, ndim=2)  # [kg/m]
-        grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient Q, times volume [kg/(m s)]
-        if effects.inertial_drag:
-            grid["drag_beyond"] = array(dtype=scalar, ndim=2)  # the same of the drag with the square of the slip
-    elif effects.porosity_update:
+    told = effects.told_to_nodes
+    types.told = {name: place for place, name in enumerate(told)}
+    types.M = wp.types.vector(max(len(told), 1), scalar)
+    if told:
+        # By how much each is more than it would be, were all of the flow's material: its points need not tell it.
+        grid["told"] = array(dtype=types.M, ndim=2)
+    if effects.porosity_update and "drag" not in told:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
         if effects.inertial_drag and effects.conductivity != "constant":
             grid["drag_beyond"] = array(dtype=scalar, ndim=2)  # the same of the drag with the square of the slip
-    if effects.materials and effects.liquid_alone:
-        grid["filling"] = array(dtype=scalar, ndim=2)  # mass of liquid that would fill the whole volume [kg/m]
     if effects.liquid_alone:
         # Velocity that the liquid would have alone. Undrained, `scatter` leaves here by how much the liquid's momentum
         # would exceed the mixture's; with two phases `move` alone writes it. Contact reads nodes without mass too:
@@ -258,6 +255,8 @@ def layout(effects: Effects) -> SimpleNamespace:
         grid["corner"] = array(dtype=S, ndim=2)
     if effects.bodies and not effects.passing:
         grid["solid"] = array(dtype=wp.int32, ndim=2)  # what a point in the cell may be near
+    if effects.smoothing_grid and effects.partly_dry:
+        grid["corner_wet"] = array(dtype=scalar, ndim=2)  # volume of what is dry; then of what is wet, over the room
     if effects.smoothing_grid:
         grid["corner_room"] = array(dtype=scalar, ndim=2)  # 1 / volume around each corner that is open to flow
     if effects.density_correction:
@@ -318,6 +317,11 @@ def layout(effects: Effects) -> SimpleNamespace:
         if effects.conductivity == "exponential":
             parameters["conductivity_scale"] = scalar  # change of the porosity for a factor of e
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
+        if effects.materials and effects.inertial_drag:
+            parameters["inertial_drag_per_mass"] = scalar  # the same of the drag with the square of the slip
+    if told:
+        parameters["excess"] = types.M  # what a point of the material tells the nodes, per mass of its solid
+        parameters["tells"] = wp.int32  # 1: it is not nil
     bodies = body_fields(effects, scalar, V2, V4, P)
     contact = contact_fields(effects, scalar, X, V3, R) if effects.bodies else {}
 

@@ -6,6 +6,7 @@ import warp as wp
 
 from .elementary import make_elementary
 from .layout import BLOCK
+from .told import next_to_nil
 
 
 def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
@@ -18,11 +19,11 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
     CORNERS = effects.smoothing_grid
     DENSITY = effects.density_correction
     LIQUID_ALONE = effects.liquid_alone
-    DRAG, BEYOND, LIQUID_MASS, FILLING = (
-        name in types.grid_fields for name in ("drag", "drag_beyond", "liquid_mass", "filling")
+    DRAG, BEYOND, TOLD, PARTLY_DRY = (
+        name in types.grid_fields for name in ("drag", "drag_beyond", "told", "corner_wet")
     )
-    PARTLY_DRY = effects.partly_dry
-    WET = S._length_ - 1
+    NEXT_TO_NIL = next_to_nil(types)
+    M = types.M
 
     @wp.kernel(module=module)
     def clear(grid: Grid, parameters: Parameters):
@@ -46,12 +47,12 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     grid.drag[i, j] = F(0.0)
                 if BEYOND:
                     grid.drag_beyond[i, j] = F(0.0)
-                if LIQUID_MASS:
-                    grid.liquid_mass[i, j] = F(0.0)
-                if FILLING:
-                    grid.filling[i, j] = F(0.0)
+                if TOLD:
+                    grid.told[i, j] = M()
                 if CORNERS:
                     grid.corner[i, j] = S()
+                if PARTLY_DRY:
+                    grid.corner_wet[i, j] = F(0.0)
 
     @wp.kernel(module=module)
     def forget(grid: Grid):
@@ -82,11 +83,12 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                             filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
                         mean[0] = filling
                         if PARTLY_DRY:
-                            # Means of the liquid over the points that have any, and last the share of the room there.
-                            wet = corner[wp.static(WET)]
-                            for k in range(2, wp.static(WET)):
-                                mean[k] = corner[k] / larger(wet, F(1.0e-30))
-                            mean[wp.static(WET)] = wet * grid.corner_room[i, j]
+                            # Means of the liquid over the points that have any.
+                            wet = larger(corner[0] - grid.corner_wet[i, j], F(0.0))
+                            if wet > F(wp.static(NEXT_TO_NIL)) * corner[0]:
+                                for k in range(2, wp.static(S._length_)):
+                                    mean[k] = corner[k] / wet
+                            grid.corner_wet[i, j] = wet * grid.corner_room[i, j]
                         grid.corner[i, j] = mean
 
         kernels.average = average

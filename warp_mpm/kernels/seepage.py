@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from .layout import BLOCK, SEEPAGE_POWER
+from .told import make_told
 
 
 def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) -> SimpleNamespace:
@@ -14,7 +15,8 @@ def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) 
     Parameters = types.Parameters
     Book = types.Book
     X64 = types.X64
-    MATERIALS = "liquid_mass" in types.grid_fields
+    MATERIALS = "liquid" in types.told
+    ratio_of_liquid = make_told(types).ratio_of_liquid
     solid_of, liquid_of, wide = vectors.solid_of, vectors.liquid_of, vectors.wide
 
     @wp.kernel(module=module)
@@ -33,7 +35,7 @@ def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) 
                 if mass > F(0.0):
                     v = grid.velocity[i, j]
                     if MATERIALS:
-                        liquid = grid.liquid_mass[i, j]
+                        liquid = mass * ratio_of_liquid(grid.told[i, j] / mass, parameters)
                     else:
                         liquid = mass * parameters.liquid_ratio
                     slip += wide(liquid * (liquid_of(v) - solid_of(v)))

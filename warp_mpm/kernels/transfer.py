@@ -44,7 +44,6 @@ def make_transfer(
     face_x, face_y, face_z = vectors.face_x, vectors.face_y, vectors.face_z
     trace, shear_rate, midway, section = vectors.trace, vectors.shear_rate, vectors.midway, vectors.section
     speed_squared = vectors.speed_squared
-    WET = S._length_ - 1
     SPATIAL = types.dimensions == 3
     LAYERS, CORNER_LAYERS = (3, 2) if SPATIAL else (1, 1)
     elementary = make_elementary(types)
@@ -74,12 +73,13 @@ def make_transfer(
     POROSITY = effects.porosity_update
     CONDUCTIVITY = effects.conductivity != "constant"
     BEYOND = "drag_beyond" in types.grid_fields
-    # Dry points in a scene that is wet elsewhere bring no liquid, and so none of these.
-    PARTLY_DRY = types.partly_dry
-    DRY = PARTLY_DRY and not LIQUID
     DRAG = "drag" in types.grid_fields and TWO_PHASE
-    OF_MATERIAL = "liquid_mass" in types.grid_fields and TWO_PHASE
-    FILLING = "filling" in types.grid_fields and LIQUID
+    PARTLY_DRY = types.partly_dry
+    DRY = PARTLY_DRY and not LIQUID  # in a scene that is wet elsewhere
+    TOLD = "told" in types.grid_fields
+    TOLD_DRAG = "drag" in types.told and POROSITY
+    TOLD_BEYOND = "drag_beyond" in types.told
+    DRAG_AT, BEYOND_AT = types.told.get("drag", 0), types.told.get("drag_beyond", 0)
     resistance = pore.resistance
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields and TWO_PHASE
     pressure_at = pore.pressure
@@ -170,21 +170,23 @@ def make_transfer(
         # Force on a node: force_x times the weight's slope (per cell) along x, plus force_y times that along y, ...
         force_x = of_phases(face_x(stress, solid_pressure, push), on_x(liquid_force))
         force_y = of_phases(face_y(stress, solid_pressure, push), on_y(liquid_force))
-        if OF_MATERIAL:
-            # Per mass of the solid; the two rates are per mass of both phases, one over the other.
-            dragging = parameters.drag_per_mass
-            if BEYOND:
-                dragging_beyond = parameters.inertial_drag_rate
-                dragging_beyond *= parameters.liquid_ratio / (F(1.0) + parameters.liquid_ratio)
-            if POROSITY:
+        if TOLD:
+            tells = parameters.tells
+            telling = parameters.excess
+            if TOLD_DRAG:
+                # All of it, and its change with the porosity.
+                tells = 1
                 ratio = n / parameters.porosity
-                dragging *= ratio * ratio
+                own_drag = parameters.drag_per_mass * ratio * ratio
+                if TOLD_BEYOND:
+                    own_beyond = parameters.inertial_drag_per_mass * ratio * ratio * ratio
                 if CONDUCTIVITY:
-                    dragging *= resisting
-                if BEYOND:
-                    dragging_beyond *= ratio * ratio * ratio
-                    if CONDUCTIVITY:
-                        dragging_beyond *= wp.sqrt(resisting)
+                    own_drag *= resisting
+                    if TOLD_BEYOND:
+                        own_beyond *= wp.sqrt(resisting)
+                telling[wp.static(DRAG_AT)] = own_drag
+                if TOLD_BEYOND:
+                    telling[wp.static(BEYOND_AT)] = own_beyond
         momentum, change_x, change_y = start(points, p, masses, gravity, time_step, parameters)
 
         to_x = V3(F(-0.5) - fx, F(0.5) - fx, F(1.5) - fx)
@@ -223,15 +225,10 @@ def make_transfer(
                 for m in range(3):
                     node = layer + k * parameters.rows + m
                     add(grid.mass, node, wy[m] * column_mass)
-                    if FILLING:
-                        add(grid.filling, node, wy[m] * column_mass * parameters.filling_ratio)
-                    if OF_MATERIAL:
-                        share = wy[m] * column_mass
-                        add(grid.liquid_mass, node, share * parameters.liquid_ratio)
-                        add(grid.drag, node, share * dragging)
-                        if BEYOND:
-                            add(grid.drag_beyond, node, share * dragging_beyond)
-                    elif DRAG:
+                    if TOLD:
+                        if tells == 1:
+                            add(grid.told, node, (wy[m] * column_mass) * telling)
+                    if DRAG:
                         # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that changes.
                         ratio = n / parameters.porosity
                         if CONDUCTIVITY:
@@ -406,17 +403,12 @@ def make_transfer(
                         if SPATIAL:
                             h *= hz[q]
                             corner += q * parameters.layer
-                        if PARTLY_DRY:
+                        if DRY:
                             sums = S()
                             sums[0] = h
                             sums[1] = h * divergence
-                            if LIQUID:
-                                sums[2] = h * excess
-                                sums[3] = h * residual
-                                if TWO_PHASE:
-                                    sums[4] = h * liquid_divergence
-                                sums[wp.static(WET)] = h
                             add(grid.corner, corner, sums)
+                            add(grid.corner_wet, corner, h)
                         elif TWO_PHASE:
                             sums = S(h, h * divergence, h * excess, h * residual, h * liquid_divergence)
                             add(grid.corner, corner, sums)

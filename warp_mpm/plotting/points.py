@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from warp_mpm.fields import colour_limits, field_named, field_values
+from warp_mpm.fields import colour_limits, field_named, field_values, solid_density_of
 from warp_mpm.plotting.site import draw_barriers, draw_ground, draw_section, lowest
 from warp_mpm.plotting.style import heading
 from warp_mpm.quantities.points import Drawn
@@ -126,7 +126,7 @@ def shown(results: Results, frame: Snapshot, field: Drawn) -> np.ndarray:
     Raises:
         ResultsError: the run has no such field.
     """
-    values = field_values(frame, field.name, results.scenario.flow.material.solid_partial_density)
+    values = field_values(frame, field.name, solid_density_of(results.scenario, frame))
     if values is None:
         raise ResultsError(f"{results.path} has no {field.words}: it is a {results.scenario.flow.formulation} flow.")
     return values

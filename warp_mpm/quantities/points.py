@@ -27,6 +27,11 @@ POINT_FIELDS: Mapping[str, Quantity] = {
         Quantity("volume", VOLUME, "volume of the material point"),
         Quantity("solid_mass", MASS, "mass of solid of the material point"),
         Quantity("liquid_mass", MASS, "mass of liquid of the material point"),
+        Quantity(
+            "material",
+            "-",
+            "place of its material, where a scene has several: 0 the flow's, then deposits' own",
+        ),
     )
 }
 """Point arrays of a snapshot, beside the positions."""
@@ -36,8 +41,8 @@ POINT_FIELDS: Mapping[str, Quantity] = {
 class Drawn(Quantity):
     """A quantity by which points can be coloured, [N] of a snapshot."""
 
-    values: Callable[[Any, float], Array] = lambda snapshot, solid_density: np.empty(0)
-    """From a snapshot and the initial mass of solid per volume of the whole [kg/m³]."""
+    values: Callable[[Any, Any], Array] = lambda snapshot, solid_density: np.empty(0)
+    """From a snapshot and the initial mass of solid per volume of the whole [kg/m³], one number or [N]."""
     needs: tuple[str, ...] = ()
     """Point arrays without which it is not there."""
     signed: bool = False

@@ -303,6 +303,8 @@ def _text(value: Any) -> str:
         return "on" if value else "off"
     if isinstance(value, float):
         return f"{value:g}"
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value)) or "off"
     if isinstance(value, list) and len(value) > 8:
         return f"{len(value)} entries"
     return str(value)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.fields import FIELDS, colour_limits, field_values
+from warp_mpm.fields import FIELDS, colour_limits, field_values, solid_density_of
 from warp_mpm.quantities.points import Drawn
 from warp_mpm.results import Results
 from warp_mpm.scenario import Scenario
@@ -60,7 +60,6 @@ def packed_frames(
         frames: at least one.
         point_stride: of so many points one is kept.
     """
-    solid_density = scenario.flow.material.solid_partial_density
     fields: list[Drawn] = []
     quantities: list[list[Array]] = []
     times: list[float] = []
@@ -71,6 +70,7 @@ def packed_frames(
             quantities = [[] for _ in range(2 + len(fields))]
         times.append(snapshot.time)
         shifts.append([moved.get(name, 0.0) for name, _, _ in scenario.all_barriers])
+        solid_density = solid_density_of(scenario, snapshot)
         columns = [*snapshot.position.T, *(field_values(snapshot, field.name, solid_density) for field in fields)]
         for column, values in zip(quantities, columns, strict=True):
             assert values is not None
@@ -107,7 +107,7 @@ def packed_frames(
 
 def _fields(scenario: Scenario, snapshot: Snapshot) -> list[Drawn]:
     """Those that a snapshot has."""
-    solid_density = scenario.flow.material.solid_partial_density
+    solid_density = solid_density_of(scenario, snapshot)
     return [field for field in FIELDS if field_values(snapshot, field.name, solid_density) is not None]
 
 

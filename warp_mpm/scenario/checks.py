@@ -51,19 +51,26 @@ def problems(scenario: Scenario) -> list[str]:
             'underside and would lift what flows beneath it; give a ground, or the kind "wall", which has no end below '
             "either"
         )
-    inertial = getattr(scenario.flow.material, "inertial_drag_coefficient", 0.0)
-    if scenario.numerics.drag == "explicit" and inertial > 0.0:
-        found.append(
-            f"flow.material.inertial_drag_coefficient = {inertial:g} is not allowed with "
-            'numerics.drag = "explicit"; it must be 0, or the drag "semi_implicit"'
-        )
-    conductivity = getattr(scenario.flow.material, "conductivity_law", "constant")
-    if scenario.numerics.drag == "explicit" and conductivity != "constant":
-        found.append(
-            f'flow.material.conductivity_law = "{conductivity}" is not allowed with numerics.drag = "explicit"; it '
-            'must be "constant", or the drag "semi_implicit"'
-        )
     flow = scenario.flow
+    named = [("flow.material", flow.material)]
+    named += [
+        (f"flow.deposits[{place}].material", flow.material_of(deposit))
+        for place, deposit in enumerate(flow.deposits)
+        if flow.material_of(deposit) != flow.material
+    ]
+    for name, material in named if scenario.numerics.drag == "explicit" else ():
+        inertial = getattr(material, "inertial_drag_coefficient", 0.0)
+        if inertial > 0.0:
+            found.append(
+                f"{name}.inertial_drag_coefficient = {inertial:g} is not allowed with "
+                'numerics.drag = "explicit"; it must be 0, or the drag "semi_implicit"'
+            )
+        conductivity = getattr(material, "conductivity_law", "constant")
+        if conductivity != "constant":
+            found.append(
+                f'{name}.conductivity_law = "{conductivity}" is not allowed with numerics.drag = "explicit"; it '
+                'must be "constant", or the drag "semi_implicit"'
+            )
     given = "flow.initial_pore_pressure_ratios"
     if flow.initial_pore_pressure_ratio is not None:
         given = f"flow.initial_pore_pressure_ratio = {flow.initial_pore_pressure_ratio:g}"

@@ -54,6 +54,24 @@ def kernel_parameters(
     return parameters
 
 
+def tell_nodes(of_materials: Sequence[Any], types: SimpleNamespace) -> None:
+    """Set what a point of each material tells the nodes, per mass of its solid: by how much it differs from the first.
+
+    A drag that changes with the porosity is told whole, by the kernels themselves.
+    """
+    if not types.told:
+        return
+    names = {"liquid": "liquid_ratio", "filling": "filling_ratio"}
+    if not types.effects.porosity_update:
+        names |= {"drag": "drag_per_mass", "drag_beyond": "inertial_drag_per_mass"}
+    for own in of_materials:
+        excess = [
+            float(getattr(own, names[name])) - float(getattr(of_materials[0], names[name])) if name in names else 0.0
+            for name in types.told
+        ]
+        own.excess, own.tells = types.M(*excess), int(any(excess))
+
+
 def _grid_and_clock(
     scenario: Scenario, effects: Effects, grid: GridLayout, limits: StepLimits, workers: int
 ) -> dict[str, Any]:
@@ -122,6 +140,8 @@ def _liquid(scenario: Scenario, effects: Effects, limits: StepLimits) -> dict[st
         if effects.inertial_drag:
             per_volume = n**3 * material.liquid_density_kg_per_m3 * material.inertial_drag_coefficient
             per_volume /= math.sqrt(material.intrinsic_permeability)
+            if effects.materials:
+                values["inertial_drag_per_mass"] = per_volume / solid
             values["inertial_drag_rate"] = per_volume * (1.0 / solid + 1.0 / liquid)
     return values
 
