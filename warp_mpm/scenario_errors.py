@@ -124,8 +124,8 @@ def _sentences_of(problem: Any, model: type[BaseModel]) -> Iterator[str]:
     else:
         words = _range_of(annotation) or _plain(problem)
         if kind in ("too_short", "too_long") and owner is not None and _is_fixed_list(annotation):
-            meaning = field_docstrings(owner)[str(location[-1])].rstrip(".")
-            words += f": {meaning[0].lower()}{meaning[1:]}"
+            meaning = field_docstrings(owner).get(str(location[-1]), "").rstrip(".")
+            words += f": {meaning[:1].lower()}{meaning[1:]}" if meaning else ""
         yield f"{path or 'The scenario'} = {_shown(value)} is not allowed; it must be {words}."
 
 

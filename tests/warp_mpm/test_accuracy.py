@@ -553,9 +553,10 @@ class TestPictures:
             assert "slope along the spacings" in panel.get_legend_handles_labels()[1]
             floors = [floor.get_y() + floor.get_height() for floor in panel.patches]
             assert floors == pytest.approx([study.doubt("overall"), study.spacing_doubt("overall")])
-        titles = [panel.get_title() for panel in error_against_time(study, []).axes if panel.axison]
+        in_time = error_against_time(study, [])
+        titles = [panel.get_title() for panel in in_time.axes if panel.axison]
         assert all("cost^-" in title for title in titles[:3])
-        for panel in error_against_time(study, []).axes[:3]:
+        for panel in in_time.axes[:3]:
             (line,) = [line for line in panel.lines if line.get_label() == "slope along the spacings"]
             time, error = np.log(line.get_xdata()), np.log(line.get_ydata())
             assert -np.polyfit(time, error, 1)[0] == pytest.approx(study.slopes["peak_force"].cost, rel=0.05)
@@ -806,8 +807,19 @@ class TestCheck:
         assert not any("1 running" in line for line in said)
 
 
+class Here(Processes):
+    """No process, whose start takes longer than the run."""
+
+    def run(self, tasks, *, on_start, **_):
+        for task in tasks:
+            on_start(task)
+            yield Ended(task, task.function(*task.arguments))
+
+
 class TestRunner:
-    def test_runs_once_and_goes_on_where_it_stopped(self, scene: Scenario, tmp_path: Path) -> None:
+    def test_runs_once_and_goes_on_where_it_stopped(
+        self, scene: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         short = scene.replaced({"output.end_time_s": 0.05, "numerics.spacing_m": 0.8})
         settings = ladder(short, [1.0, 0.8])
         seen: list[StudyProgress] = []
@@ -817,6 +829,7 @@ class TestRunner:
         assert all(p.done + len(p.running) + p.left == 2 for p in seen)
         (tmp_path / f"{settings[0].key}.json").unlink()
         (tmp_path / f"{settings[1].key}.json").write_text(json.dumps(first[settings[1].key] | {"steps": -1}))
+        monkeypatch.setattr(runner, "Processes", Here)
         second = run_settings(settings, tmp_path, jobs=1)
         assert second[settings[1].key]["steps"] == -1  # read, not run
         assert second[settings[0].key]["figures"] == first[settings[0].key]["figures"]
@@ -825,14 +838,6 @@ class TestRunner:
     def test_damaged_result_is_run_again(
         self, scene: Scenario, tmp_path: Path, damaged: str, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        class Here(Processes):
-            """No process, whose start takes longer than the run."""
-
-            def run(self, tasks, *, on_start, **_):
-                for task in tasks:
-                    on_start(task)
-                    yield Ended(task, task.function(*task.arguments))
-
         monkeypatch.setattr(runner, "Processes", Here)
         (setting,) = ladder(scene.replaced({"output.end_time_s": 0.02}), [1.0])
         (tmp_path / f"{setting.key}.json").write_text(damaged)

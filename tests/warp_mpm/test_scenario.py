@@ -473,3 +473,16 @@ def test_an_outline_too_thin_to_have_an_inside(case_1, vertices):
 def test_a_phase_without_weight(case_1):
     with pytest.raises(ValueError, match=r"flow.material: sound would run through it at .* m/s; porosity, densities"):
         step_limits(case_1.replaced({"flow.material.porosity": 5e-324}))
+
+
+def test_the_schema_says_what_each_field_means():
+    """In the words of its docstring, wherever the field was declared: in a base, by a law, by a transfer scheme."""
+    parts = json.loads(json_schema())["$defs"]
+    assert parts["Gravity"]["properties"]["tilt_deg"]["description"].startswith("Slope of the ground. Positive: ")
+    assert parts["Numerics"]["properties"]["transfer_damping"]["description"].startswith("With aflip: rate β at which ")
+    for name in ("DryFlow", "TwoPhaseFlow"):
+        assert parts[name]["properties"]["velocity_m_per_s"]["description"]
+    for name in ("SkeletonHerschelBulkley", "UndrainedMaterialHerschelBulkley"):
+        fields = parts[name]["properties"]
+        assert fields["yield_stress_Pa"]["description"] == "Shear stress τ_y below which it does not flow."
+        assert fields["young_modulus_Pa"]["description"]
