@@ -258,7 +258,8 @@ class Simulation:
             "book": self._book,
         }
         self._entry = initial.entry[initial.there :]
-        self._counts = {"one": 1, "workers": self._workers, "points": self._expected(0.0)}
+        self._counts = {"one": 1, "workers": self._workers}
+        self._go_over(self._expected(0.0))
         if self.effects.bodies:
             self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
@@ -376,8 +377,20 @@ class Simulation:
         """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing."""
         expected = self._expected(until)
         if expected > self._counts["points"]:
-            self._counts["points"] = expected
+            self._go_over(expected)
             self._graph = None
+
+    def _go_over(self, count: int) -> None:
+        """Let the kernels go over the first so many points."""
+        self._counts["points"] = count
+        self._arguments["span"], self._counts["flow"] = self._span(0, count)
+        self._arguments["approaching"], self._counts["approach"] = self._span(0, count)
+
+    def _span(self, begin: int, end: int) -> tuple[Any, int]:
+        """Points from one to before another, and the threads that share them."""
+        span = self._types.Span()
+        span.begin, span.end, span.step = begin, end, 1 if self.device.is_cpu else max(1, end - begin)
+        return span, span.step
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""

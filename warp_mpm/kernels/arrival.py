@@ -47,6 +47,7 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
     effects = types.effects
     F, V2, V, S = types.scalar, types.V2, types.V, types.S
     Points, Grid, Parameters, Arrival, Book = types.Points, types.Grid, types.Parameters, types.Arrival, types.Book
+    Span = types.Span
     elementary = make_elementary(types)
     read, write = elementary.read, elementary.write
     TWO_PHASE = effects.two_phase
@@ -137,13 +138,17 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         energy = wp.float64(F(0.5) * wp.dot(v, v) - wp.dot(parameters.gravity, x))
         wp.atomic_add(arrival.inflow, wp.static(INFLOW_ENERGY), total * energy)
 
-    @wp.kernel(module=module)
-    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book):
+    @wp.func
+    def convoy(
+        p: wp.int32,
+        state: wp.int32,
+        points: Points,
+        grid: Grid,
+        parameters: Parameters,
+        arrival: Arrival,
+        book: Book,
+    ):
         """Move the points that approach as the conveyor does; those whose time has come begin to, or are let go."""
-        p = wp.tid()
-        state = read(points.inside, p)
-        if state != wp.static(WAITING) and state != wp.static(HELD):
-            return
         pace = wp.float64(read(points.pace, p))
         x = read(points.position, p)
         way = arrival.conveyed[wp.static(CONVEYED_WAY)]
@@ -188,5 +193,12 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
         points.inside[p] = wp.static(HELD)
         if at >= arrival.section:
             let_go(points, p, place, v, parameters, arrival, book)
+
+    @wp.kernel(module=module)
+    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book, approaching: Span):
+        for p in range(approaching.begin + wp.tid(), approaching.end, approaching.step):
+            state = read(points.inside, p)
+            if state == wp.static(WAITING) or state == wp.static(HELD):
+                convoy(p, state, points, grid, parameters, arrival, book)
 
     return SimpleNamespace(convey=convey, hold=hold)

@@ -71,7 +71,7 @@ def make_constitutive(
     AT_ONCE = effects.skeleton.vectorised
     BODIES = effects.bodies
     Bodies = types.Bodies
-    Book = types.Book
+    Book, Span = types.Book, types.Span
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
     about = bodies_of.about if BODIES else None
@@ -143,8 +143,9 @@ def make_constitutive(
             result = result and sz >= margin and sz < F(parameters.layers) - margin
         return result
 
-    @wp.kernel(module=module)
-    def advect(
+    @wp.func
+    def carry(
+        p: wp.int32,
         points: Points,
         grid: Grid,
         parameters: Parameters,
@@ -152,9 +153,6 @@ def make_constitutive(
         book: Book,
     ):
         """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
-        p = wp.tid()
-        if read(points.inside, p) != wp.static(INSIDE):
-            return
         time_step = F(book.clock[wp.static(TIME_STEP)])
         shift = F(grid.shift[0])
         x = read(points.position, p)
@@ -231,6 +229,12 @@ def make_constitutive(
                 if gap > largest:
                     write(points.solid_gap, p, largest)
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+
+    @wp.kernel(module=module)
+    def advect(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book, span: Span):
+        for p in range(span.begin + wp.tid(), span.end, span.step):
+            if read(points.inside, p) == wp.static(INSIDE):
+                carry(p, points, grid, parameters, bodies, book)
 
     @wp.func
     def settle(
@@ -334,12 +338,9 @@ def make_constitutive(
             if OPENS:
                 write(points.solid_gap, p, gap)
 
-    @wp.kernel(module=module)
-    def bound(points: Points, parameters: Parameters, book: Book):
+    @wp.func
+    def limit(p: wp.int32, points: Points, parameters: Parameters, book: Book):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
-        p = wp.tid()
-        if read(points.inside, p) <= 0:
-            return
         grains = parameters.grain_share * read(points.reference_volume, p)
         volume = read(points.volume, p)
         if volume < grains:
@@ -355,6 +356,12 @@ def make_constitutive(
                 if read(points.liquid_strain, p) > largest:
                     write(points.liquid_strain, p, largest)
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+
+    @wp.kernel(module=module)
+    def bound(points: Points, parameters: Parameters, book: Book, span: Span):
+        for p in range(span.begin + wp.tid(), span.end, span.step):
+            if read(points.inside, p) > 0:
+                limit(p, points, parameters, book)
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
     if effects.arriving:
