@@ -71,7 +71,7 @@ INTERVAL = ("begin", "reactions", "turned", "taken")
 ARRIVED = ("conveyed", "inflow")
 """Arrays of an inflow that change during a run."""
 
-GROWTHS = 32
+GROWTHS = 12
 """Times at most that a run with an inflow is captured anew, for more points."""
 
 LOADS = ("taken", "turned")
@@ -259,10 +259,12 @@ class Simulation:
         }
         self._entry = initial.entry[initial.there :]
         self._counts = {"one": 1, "workers": self._workers}
-        self._go_over(self._expected(0.0))
         if self.effects.bodies:
             self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
+        self._in_flow = (0, 0, 0)
+        """Entries FLOW_... of what the kernels over the flow go over, as the device knows them."""
+        self._make_room(0.0)
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
         self._kernels_of_a_step: tuple[str, ...] = ()
@@ -362,35 +364,33 @@ class Simulation:
         self._sums.zero_()
         self._launch(LEDGER, self._workers, [self._arguments[name] for name in LEDGER.takes])
 
-    def _expected(self, until: float) -> int:
-        """Material points that kernels go over up to a time [s]: what has yet to arrive comes last, and later."""
-        inflow = self.scenario.flow.inflow
-        if inflow is None:
-            return self.material_points
-        waiting = len(self._entry)
-        share = max(1, -(-waiting // GROWTHS))
-        # On the device the way is summed up in other pieces.
-        come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
-        return self.material_points - waiting + min(waiting, -(-come // share) * share)
-
     def _make_room(self, until: float) -> None:
-        """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing."""
-        expected = self._expected(until)
-        if expected > self._counts["points"]:
-            self._go_over(expected)
+        """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing.
+
+        Those over the flow are told how many these are. `update` has a thread for each point, so that it is captured
+        anew, for some more points at a time.
+        """
+        inflow, waiting = self.scenario.flow.inflow, len(self._entry)
+        come = 0
+        if inflow is not None:
+            # On the device the way is summed up in other pieces.
+            come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
+        there = self.material_points - waiting
+        share = max(1, -(-waiting // GROWTHS))
+        threads = there + min(waiting, -(-come // share) * share)
+        if threads > self._counts.get("points", -1):
+            self._counts["points"] = threads
+            self._counts["flow"] = 1 if self.device.is_cpu else threads
             self._graph = None
-
-    def _go_over(self, count: int) -> None:
-        """Let the kernels go over the first so many points."""
-        self._counts["points"] = count
-        self._arguments["span"], self._counts["flow"] = self._span(0, count)
-        self._arguments["approaching"], self._counts["approach"] = self._span(0, count)
-
-    def _span(self, begin: int, end: int) -> tuple[Any, int]:
-        """Points from one to before another, and the threads that share them."""
-        span = self._types.Span()
-        span.begin, span.end, span.step = begin, end, 1 if self.device.is_cpu else max(1, end - begin)
-        return span, span.step
+        end, arriving = there + come, self._in_flow[at.FLOW_ARRIVING]
+        if inflow is not None:
+            state = self._point_arrays["inside"].numpy()[arriving:end]
+            not_yet = (state == at.WAITING) | (state == at.HELD)
+            arriving += int(not_yet.argmax()) if not_yet.any() else len(state)
+        in_flow = end, arriving, self._counts["flow"]
+        if in_flow != self._in_flow:
+            self._in_flow = in_flow
+            self._clock_arrays["flow"].assign(np.array(in_flow, dtype=np.int32))
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -853,6 +853,7 @@ class Simulation:
         state = saved.unpacked(data, self._state())
         for name, array in self._state_arrays().items():
             array.assign(state[name])
+        self._in_flow = (0, 0, 0)  # found anew
         self._initial_momentum = state["initial_momentum"].tolist()
         (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
         self._since = replace(

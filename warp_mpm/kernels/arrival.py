@@ -14,6 +14,9 @@ from .layout import (
     CONVEYED_STRETCH,
     CONVEYED_STRETCH_BEFORE,
     CONVEYED_WAY,
+    FLOW_ARRIVING,
+    FLOW_END,
+    FLOW_STEP,
     HELD,
     INFLOW_ENERGY,
     INFLOW_LIQUID_MASS,
@@ -47,7 +50,6 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
     effects = types.effects
     F, V2, V, S = types.scalar, types.V2, types.V, types.S
     Points, Grid, Parameters, Arrival, Book = types.Points, types.Grid, types.Parameters, types.Arrival, types.Book
-    Span = types.Span
     elementary = make_elementary(types)
     read, write = elementary.read, elementary.write
     TWO_PHASE = effects.two_phase
@@ -195,8 +197,9 @@ def make_arrival(types: SimpleNamespace, pore: SimpleNamespace, rest: Any, modul
             let_go(points, p, place, v, parameters, arrival, book)
 
     @wp.kernel(module=module)
-    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book, approaching: Span):
-        for p in range(approaching.begin + wp.tid(), approaching.end, approaching.step):
+    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book):
+        begin = book.flow[wp.static(FLOW_ARRIVING)] + wp.tid()
+        for p in range(begin, book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
             state = read(points.inside, p)
             if state == wp.static(WAITING) or state == wp.static(HELD):
                 convoy(p, state, points, grid, parameters, arrival, book)

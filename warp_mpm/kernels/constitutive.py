@@ -10,6 +10,8 @@ from .arrival import make_arrival
 from .elementary import make_elementary
 from .layout import (
     DIVERGED,
+    FLOW_END,
+    FLOW_STEP,
     GAPS_BOUNDED,
     INSIDE,
     LEFT_ENERGY,
@@ -71,7 +73,7 @@ def make_constitutive(
     AT_ONCE = effects.skeleton.vectorised
     BODIES = effects.bodies
     Bodies = types.Bodies
-    Book, Span = types.Book, types.Span
+    Book = types.Book
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
     about = bodies_of.about if BODIES else None
@@ -231,8 +233,8 @@ def make_constitutive(
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     @wp.kernel(module=module)
-    def advect(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book, span: Span):
-        for p in range(span.begin + wp.tid(), span.end, span.step):
+    def advect(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
             if read(points.inside, p) == wp.static(INSIDE):
                 carry(p, points, grid, parameters, bodies, book)
 
@@ -358,8 +360,8 @@ def make_constitutive(
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
 
     @wp.kernel(module=module)
-    def bound(points: Points, parameters: Parameters, book: Book, span: Span):
-        for p in range(span.begin + wp.tid(), span.end, span.step):
+    def bound(points: Points, parameters: Parameters, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
             if read(points.inside, p) > 0:
                 limit(p, points, parameters, book)
 

@@ -150,6 +150,16 @@ SLOT_ALONG = 2
 """Along the surface, toward its next slot."""
 SLOT_SIZE = 3
 
+# Which material points kernels over the flow go over, an int32 array that the host fills; no part of the state.
+FLOW_END = 0
+"""Those before this one; what comes later has yet to arrive."""
+FLOW_ARRIVING = 1
+"""All that has arrived comes before this one."""
+FLOW_STEP = 2
+"""Each thread takes every so many of them. A processor's one thread takes them all, in a loop of its own: so it fetches
+once what it needs for every point, which else is a fifth of a kernel's time."""
+FLOW_SIZE = 3
+
 BOOK: dict[str, Any] = {
     "clock": wp.array(dtype=wp.float64),
     "counters": wp.array(dtype=wp.int32),
@@ -158,16 +168,11 @@ BOOK: dict[str, Any] = {
     "reactions": wp.array(dtype=wp.float64),
     "left": wp.array(dtype=wp.float64),
     "sums": wp.array(dtype=wp.float64),
+    "flow": wp.array(dtype=wp.int32),
 }
 """What is kept account of, in one structure. Of a kernel that takes an array by itself, Warp compiles a second version
 for an array with gaps, which is never called; that is a third of the compiler's time. Only `update` needs it so: the
 first version is the one that becomes vector instructions."""
-
-
-SPAN: dict[str, Any] = {"begin": wp.int32, "end": wp.int32, "step": wp.int32}
-"""The material points that a kernel goes over: from one to before another, each thread every so many of them. A
-processor's one thread takes them all in a loop of its own, so that it fetches what all points need once, not for each:
-that is a fifth of a kernel's time."""
 
 
 def _structure(name: str, fields: dict[str, Any]) -> Any:
@@ -341,7 +346,6 @@ def layout(effects: Effects) -> SimpleNamespace:
     types.Bodies = _structure("Bodies", bodies)
     types.Contact = _structure("Contact", contact)
     types.Book = _structure("Book", BOOK)
-    types.Span = _structure("Span", SPAN)
     types.point_fields, types.grid_fields, types.parameter_fields = points, grid, parameters
     types.body_fields, types.contact_fields, types.arrival_fields = bodies, contact, arrival
     return types

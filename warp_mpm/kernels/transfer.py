@@ -11,6 +11,8 @@ from .elementary import make_elementary
 from .layout import (
     BLOCK,
     BLOCK_SHIFT,
+    FLOW_END,
+    FLOW_STEP,
     SPEED_MAX,
     TIME_STEP,
 )
@@ -81,7 +83,7 @@ def make_transfer(
     MOVING = effects.moving
     RESTING = not effects.passing
     Bodies = types.Bodies
-    Book, Span = types.Book, types.Span
+    Book = types.Book
     POROSITY = effects.porosity_update
     CONDUCTIVITY = effects.conductivity != "constant"
     BEYOND = "drag_beyond" in types.grid_fields
@@ -296,8 +298,8 @@ def make_transfer(
                             add(grid.liquid_alone, node, excess)
 
     @wp.kernel(module=module)
-    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book, span: Span):
-        for p in range(span.begin + wp.tid(), span.end, span.step):
+    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
             if read(points.inside, p) > 0:
                 spread(p, points, grid, parameters, bodies, book)
 
@@ -410,8 +412,8 @@ def make_transfer(
                             add(grid.corner, corner, S(h, h * divergence))
 
     @wp.kernel(module=module)
-    def gather(points: Points, grid: Grid, parameters: Parameters, book: Book, span: Span):
-        for p in range(span.begin + wp.tid(), span.end, span.step):
+    def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
             if read(points.inside, p) > 0:
                 take(p, points, grid, parameters, book)
 

@@ -11,9 +11,9 @@ class Launch:
     """One launch of a kernel."""
 
     kernel: str
-    over: Literal["one", "workers", "points", "flow", "approach", "groups", "lanes"]
-    """What its threads count: workers share the blocks of the grid in use; points have one each; of the flow and of its
-    approach to a section they take points in turn; groups are of places of contact, and lanes share those that are
+    over: Literal["one", "workers", "points", "flow", "groups", "lanes"]
+    """What its threads count: workers share the blocks of the grid in use; points have one each, and in the flow
+    they take them in turn; groups are of places of contact, and lanes share those that are
     joined."""
     takes: tuple[str, ...]
     """Its arguments, by the names under which the simulation knows them."""

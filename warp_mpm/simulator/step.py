@@ -18,7 +18,7 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     step = [
         Launch("clear", "workers", ("grid", "parameters"), "empties the blocks that were in use"),
         Launch("forget", "one", ("grid",), "empties their list"),
-        Launch("scatter", "flow", (*points, "span"), "mass, momentum and internal force of the points to the nodes"),
+        Launch("scatter", "flow", points, "mass, momentum and internal force of the points to the nodes"),
         Launch("move", "workers", grid, "velocities of the nodes at the end of the step, drag included"),
     ]
     seen = ("contact", "bodies", *grid)
@@ -28,23 +28,21 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
         step.append(Launch("join", "lanes", seen, "contact at all others, and bodies that slide"))
     if effects.two_phase:
         step.append(Launch("seep", "workers", grid, "rate at which gravity works on liquid that seeps"))
-    step.append(
-        Launch("gather", "flow", ("points", *grid, "span"), "velocities, their gradients and strains from the nodes")
-    )
+    step.append(Launch("gather", "flow", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
     takes = ("points", "parameters", "book")
-    step.append(Launch("advect", "flow", (*points, "span"), "moves the points"))
+    step.append(Launch("advect", "flow", points, "moves the points"))
     if effects.arriving:
-        arriving = ("points", "grid", "parameters", "arrival", "book", "approaching")
+        arriving = ("points", "grid", "parameters", "arrival", "book")
         step += [
             Launch("convey", "one", ("arrival", "book"), "how far what arrives has come"),
-            Launch("hold", "approach", arriving, "points on their last cells before the section of an inflow"),
+            Launch("hold", "flow", arriving, "points on their last cells before the section of an inflow"),
         ]
     step += [
         Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
         *(() if effects.skeleton.vectorised else (Launch("yielding", "points", takes, "what the law allows"),)),
-        Launch("bound", "flow", (*takes, "span"), "limits that few points come to"),
+        Launch("bound", "flow", takes, "limits that few points come to"),
         Launch(
             "tick",
             "one",
