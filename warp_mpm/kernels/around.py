@@ -94,3 +94,94 @@ def make_around(types: SimpleNamespace) -> SimpleNamespace:
     def part(all: All, which: wp.int32) -> V: ...
 
     return SimpleNamespace(nine=nine, part=part)
+
+
+def make_at_places(types: SimpleNamespace) -> SimpleNamespace:
+    """Build the same of places that act on their nodes again and again in a step, with weights that are kept.
+
+    - `weigh(masses, first, rows, layer, wx, wy, wz, weight, per_mass, e) -> V2`: sum N_i^2 / m_i and sum N_i over the
+      nodes that have mass; keeps N_i in `weight`, and N_i / m_i in `per_mass`, 0 where there is no mass.
+    - `rescale(weight, per_mass, e, by)`: both, times a number.
+    - `seen(array, first, rows, layer, weight, e)`: sum of a field times the weights.
+    - `give(array, first, rows, layer, per_mass, e, value)`: adds a value times N_i / m_i, at nodes with mass.
+
+    Nodes are counted column by column, in space layer by layer; `layer` is how far those are apart.
+    """
+    F, V, X, V2, V3, W = types.scalar, types.V, types.X, types.V2, types.V3, types.W
+    number = "double" if F == wp.float64 else "float"
+    count = W._length_
+    node = "(k / 9) * layer + (k / 3) % 3 * rows + k % 3"
+    kept, scalars = wp.array(dtype=W), wp.array(dtype=F, ndim=2)
+    across = " * wz.c[k / 9]" if count > 9 else ""
+
+    @wp.func_native(f"""
+        {number} inverse = 0, total = 0;
+        {number}* ws = weight.data[e].c;
+        {number}* shares = per_mass.data[e].c;
+        for (int k = 0; k < {count}; ++k) {{
+            {number} w = wx.c[(k / 3) % 3] * wy.c[k % 3]{across};
+            {number} mass = masses.data[first + {node}];
+            {number} share = mass > 0 ? w / mass : 0;
+            ws[k] = w;
+            shares[k] = share;
+            inverse += w * share;
+            total += share > 0 ? w : 0;
+        }}
+        return wp::vec_t<2, {number}>(inverse, total);
+    """)
+    def weigh(
+        masses: scalars,
+        first: wp.int32,
+        rows: wp.int32,
+        layer: wp.int32,
+        wx: V3,
+        wy: V3,
+        wz: V3,
+        weight: kept,
+        per_mass: kept,
+        e: wp.int32,
+    ) -> V2: ...
+
+    @wp.func_native(f"for (int k = 0; k < {count}; ++k) {{ weight.data[e].c[k] *= by; per_mass.data[e].c[k] *= by; }}")
+    def rescale(weight: kept, per_mass: kept, e: wp.int32, by: F): ...
+
+    # Each round adds an overload.
+    for vector in dict.fromkeys((V, X)):
+        field, lanes = wp.array(dtype=vector, ndim=2), lanes_of(vector, F)
+
+        @wp.func_native(f"""{lanes}
+            const lanes* at = (const lanes*)(array.data + first);
+            const {number}* w = weight.data[e].c;
+            lanes sum = at[0] * w[0] + at[1] * w[1] + at[2] * w[2];
+            for (int k = 3; k < {count}; k += 3) {{
+                const lanes* column = at + {node};
+                sum = sum + (column[0] * w[k] + column[1] * w[k + 1] + column[2] * w[k + 2]);
+            }}
+            wp::vec_t<{vector._length_}, {number}> result;
+            *(lanes*)&result = sum;
+            return result;
+        """)
+        def seen(array: field, first: wp.int32, rows: wp.int32, layer: wp.int32, weight: kept, e: wp.int32) -> vector: ...
+
+        @wp.func_native(f"""{lanes}
+            lanes* at = (lanes*)(array.data + first);
+            const {number}* share = per_mass.data[e].c;
+            const lanes given = *(const lanes*)&value;
+            for (int k = 0; k < {count}; ++k) {{
+                #if defined(__CUDA_ARCH__)
+                if (share[k] == 0) continue;  // another thread may add to the node
+                #endif
+                at[{node}] = at[{node}] + given * share[k];
+            }}
+        """)
+        def give(
+            array: field,
+            first: wp.int32,
+            rows: wp.int32,
+            layer: wp.int32,
+            per_mass: kept,
+            e: wp.int32,
+            value: vector,
+        ): ...
+
+    return SimpleNamespace(weigh=weigh, rescale=rescale, seen=seen, give=give)

@@ -18,7 +18,7 @@ from typing import Any
 
 import warp as wp
 
-from .elementary import make_elementary
+from .around import make_at_places
 from .layout import (
     BARRIER_ITERATIONS,
     BARRIER_UNCONVERGED,
@@ -70,8 +70,8 @@ def make_contact(
     TURBULENCE = effects.turbulence
     CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
-    elementary = make_elementary(types)
-    read, write = elementary.read, elementary.write
+    at_places = make_at_places(types)
+    weigh, rescale, seen_at, give_at = at_places.weigh, at_places.rescale, at_places.seen, at_places.give
     weights, cell_of = shapes.weights, shapes.cell_of
     displaced, look_ahead = bodies_of.displaced, bodies_of.look_ahead
     of_phases, solid_of, liquid_of = vectors.of_phases, vectors.solid_of, vectors.liquid_of
@@ -82,94 +82,75 @@ def make_contact(
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
-    def around(contact: Contact, e: wp.int32, wx: V3, wy: V3, k: wp.int32, parameters: Parameters):
-        """Weight and number of the k-th node around a place."""
-        w = wx[(k / 3) % 3] * wy[k % 3]
-        node = contact.first[e] + ((k / 3) % 3) * parameters.rows + k % 3
+    def layer_of(parameters: Parameters) -> wp.int32:
+        """Nodes from a layer to the next."""
+        layer = wp.int32(0)
         if SPATIAL:
-            w *= contact.weight_z[e][k / 9]
-            node += (k / 9) * parameters.layer
-        return w, node
+            layer = parameters.layer
+        return layer
 
     @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
         """sum N_i^2 / m_i of the solid, with weights that add up to one over the nodes that have mass; 0 where the flow
         is not at the surface: too few of the nodes have any."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = F(0.0)
-        total = F(0.0)
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    result += w * w / mass
-                    total += w
+        wz = V3()
+        if SPATIAL:
+            wz = contact.weight_z[e]
+        sums = weigh(
+            grid.mass,
+            contact.first[e],
+            parameters.rows,
+            layer_of(parameters),
+            contact.weight_x[e],
+            contact.weight_y[e],
+            wz,
+            contact.weight,
+            contact.per_mass,
+            e,
+        )
+        result = sums[0]
+        total = sums[1]
         if total < F(wp.static(REACHED)):
             result = F(0.0)
         elif contact.fixed[e] == 0:
-            contact.weight_x[e] = wx / total
-            result = result / (total * total)
+            by = F(1.0) / total
+            rescale(contact.weight, contact.per_mass, e, by)
+            result *= by * by
         return result
 
     @wp.func
     def seen(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V:
         """Velocities of the flow at the place."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = V()
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.velocity, node)
-        return result
+        return seen_at(grid.velocity, contact.first[e], parameters.rows, layer_of(parameters), contact.weight, e)
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = X()
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.liquid_alone, node)
-        return result
+        return seen_at(grid.liquid_alone, contact.first[e], parameters.rows, layer_of(parameters), contact.weight, e)
 
     @wp.func
     def give(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """Impulses per phase, over the share of the solid's mass that each has, to the nodes."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    write(grid.velocity, node, read(grid.velocity, node) + (w / mass) * impulse)
+        layer = layer_of(parameters)
+        give_at(grid.velocity, contact.first[e], parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def give_scheme(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """The same to what the transfer scheme keeps."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
+        per_mass = contact.per_mass[e]
         for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    i = node / parameters.rows
-                    receive(grid, i, node - i * parameters.rows, (w / mass) * impulse)
+            share = per_mass[k]
+            if share > F(0.0):
+                node = contact.first[e] + ((k / 3) % 3) * parameters.rows + k % 3
+                if SPATIAL:
+                    node += (k / 9) * parameters.layer
+                i = node / parameters.rows
+                receive(grid, i, node - i * parameters.rows, share * impulse)
 
     @wp.func
     def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    write(grid.liquid_alone, node, read(grid.liquid_alone, node) + (w / mass) * impulse)
+        layer = layer_of(parameters)
+        give_at(grid.liquid_alone, contact.first[e], parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def drag_share(parameters: Parameters, time_step: F) -> F:
@@ -403,18 +384,17 @@ def make_contact(
     @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
-        wet = wp.bool(True)
         if contact.fixed[e] == 0:
             at = contact.position[e] + across(displaced(bodies, contact.body[e]))
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
             contact.first[e] = wp.int32(-1)
             if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
-                contact.first[e] = (i - 1) * parameters.rows + j - 1
-                contact.weight_x[e] = weights(fx)
-                contact.weight_y[e] = weights(fy)
-                wet = in_use(grid, i, j)
+                if in_use(grid, i, j):
+                    contact.first[e] = (i - 1) * parameters.rows + j - 1
+                    contact.weight_x[e] = weights(fx)
+                    contact.weight_y[e] = weights(fy)
         inverse = F(0.0)
-        if contact.first[e] >= 0 and wet:
+        if contact.first[e] >= 0:
             inverse = inverse_mass(contact, e, grid, parameters)
         contact.inverse[e] = inverse
 

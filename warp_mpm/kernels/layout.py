@@ -201,8 +201,9 @@ def layout(effects: Effects) -> SimpleNamespace:
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     P = wp.types.vector(PIECE, scalar)
+    W = wp.types.vector(3**dimensions, scalar)  # of the nodes around a place of contact
     array = wp.array
-    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
+    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, W=W, components=components)
     types.dimensions, types.X, types.X64, types.T, types.G, types.R = dimensions, X, X64, T, G, R
 
     points: dict[str, Any] = {
@@ -319,7 +320,7 @@ def layout(effects: Effects) -> SimpleNamespace:
             parameters["conductivity_scale"] = scalar  # change of the porosity for a factor of e
         parameters["drag_per_mass"] = scalar  # Q = n^2 rho_L g / k_sat, per mass of the solid in a volume
     bodies = body_fields(effects, scalar, V2, V4, P)
-    contact = contact_fields(effects, scalar, X, V3, R) if effects.bodies else {}
+    contact = contact_fields(effects, scalar, X, V3, W, R) if effects.bodies else {}
 
     arrival: dict[str, Any] = {}
     if effects.arriving:
