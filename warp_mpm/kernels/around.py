@@ -161,7 +161,9 @@ def make_at_places(types: SimpleNamespace) -> SimpleNamespace:
             *(lanes*)&result = sum;
             return result;
         """)
-        def seen(array: field, first: wp.int32, rows: wp.int32, layer: wp.int32, weight: kept, e: wp.int32) -> vector: ...
+        def seen(
+            array: field, first: wp.int32, rows: wp.int32, layer: wp.int32, weight: kept, e: wp.int32
+        ) -> vector: ...
 
         @wp.func_native(f"""{lanes}
             lanes* at = (lanes*)(array.data + first);

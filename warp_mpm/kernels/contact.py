@@ -19,6 +19,7 @@ from typing import Any
 import warp as wp
 
 from .around import make_at_places
+from .elementary import make_elementary
 from .layout import (
     BARRIER_ITERATIONS,
     BARRIER_UNCONVERGED,
@@ -70,6 +71,8 @@ def make_contact(
     TURBULENCE = effects.turbulence
     CARRIED = FRICTION and LIQUID
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
+    elementary = make_elementary(types)
+    read, write = elementary.read, elementary.write
     at_places = make_at_places(types)
     weigh, rescale, seen_at, give_at = at_places.weigh, at_places.rescale, at_places.seen, at_places.give
     weights, cell_of = shapes.weights, shapes.cell_of
@@ -98,7 +101,7 @@ def make_contact(
             wz = contact.weight_z[e]
         sums = weigh(
             grid.mass,
-            contact.first[e],
+            read(contact.first, e),
             parameters.rows,
             layer_of(parameters),
             contact.weight_x[e],
@@ -112,7 +115,7 @@ def make_contact(
         total = sums[1]
         if total < F(wp.static(REACHED)):
             result = F(0.0)
-        elif contact.fixed[e] == 0:
+        elif read(contact.fixed, e) == 0:
             by = F(1.0) / total
             rescale(contact.weight, contact.per_mass, e, by)
             result *= by * by
@@ -121,36 +124,40 @@ def make_contact(
     @wp.func
     def seen(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V:
         """Velocities of the flow at the place."""
-        return seen_at(grid.velocity, contact.first[e], parameters.rows, layer_of(parameters), contact.weight, e)
+        return seen_at(grid.velocity, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e)
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
-        return seen_at(grid.liquid_alone, contact.first[e], parameters.rows, layer_of(parameters), contact.weight, e)
+        return seen_at(
+            grid.liquid_alone, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e
+        )
 
     @wp.func
     def give(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """Impulses per phase, over the share of the solid's mass that each has, to the nodes."""
         layer = layer_of(parameters)
-        give_at(grid.velocity, contact.first[e], parameters.rows, layer, contact.per_mass, e, impulse)
+        give_at(grid.velocity, read(contact.first, e), parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def give_scheme(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """The same to what the transfer scheme keeps."""
         per_mass = contact.per_mass[e]
+        first = read(contact.first, e)
+        column = first / parameters.rows
+        row = first - column * parameters.rows
         for k in range(AROUND):
             share = per_mass[k]
             if share > F(0.0):
-                node = contact.first[e] + ((k / 3) % 3) * parameters.rows + k % 3
+                i = column + (k / 3) % 3
                 if SPATIAL:
-                    node += (k / 9) * parameters.layer
-                i = node / parameters.rows
-                receive(grid, i, node - i * parameters.rows, share * impulse)
+                    i += (k / 9) * parameters.columns
+                receive(grid, i, row + k % 3, share * impulse)
 
     @wp.func
     def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
         layer = layer_of(parameters)
-        give_at(grid.liquid_alone, contact.first[e], parameters.rows, layer, contact.per_mass, e, impulse)
+        give_at(grid.liquid_alone, read(contact.first, e), parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def drag_share(parameters: Parameters, time_step: F) -> F:
@@ -164,31 +171,31 @@ def make_contact(
     @wp.func
     def whole(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> V:
         """All that the place has given in the step, in the form that `give` takes."""
-        n = contact.normal[e]
-        solid = contact.solid[e] * n
+        n = read(contact.normal, e)
+        solid = read(contact.solid, e) * n
         liquid = X()
         if TWO_PHASE:
-            liquid = (contact.liquid[e] / parameters.liquid_ratio) * n
+            liquid = (read(contact.liquid, e) / parameters.liquid_ratio) * n
             if FRICTION:
                 share = drag_share(parameters, time_step)
-                rub = contact.rubbed[e] / (F(1.0) + parameters.liquid_ratio * share)
+                rub = read(contact.rubbed, e) / (F(1.0) + parameters.liquid_ratio * share)
                 solid += along(rub, n)
                 liquid += along(share * rub, n)
         else:
             if FRICTION:
-                solid += along(contact.rubbed[e], n)
+                solid += along(read(contact.rubbed, e), n)
         return of_phases(solid, liquid)
 
     @wp.func
     def on_body(contact: Contact, e: wp.int32) -> X:
         """Impulse of the flow on the surface, Eq. (A14)."""
-        n = contact.normal[e]
-        total = contact.solid[e]
+        n = read(contact.normal, e)
+        total = read(contact.solid, e)
         if TWO_PHASE:
-            total += contact.liquid[e]
+            total += read(contact.liquid, e)
         result = -total * n
         if FRICTION:
-            result -= along(contact.rubbed[e], n)
+            result -= along(read(contact.rubbed, e), n)
         return result
 
     @wp.func
@@ -272,18 +279,18 @@ def make_contact(
     @wp.func
     def effective(contact: Contact, e: wp.int32) -> F:
         """Normal impulse less what the liquid's pressure carries."""
-        result = contact.solid[e]
+        result = read(contact.solid, e)
         if TWO_PHASE:
-            result += contact.liquid[e]
+            result += read(contact.liquid, e)
         if CARRIED:
-            result -= contact.alone[e]
+            result -= read(contact.alone, e)
         return result
 
     @wp.func
     def turbulent(contact: Contact, e: wp.int32, bodies: Bodies, free: F, limit: F, mobility: F, time_step: F) -> F:
         """Impulse D v² of Voellmy's friction beside Coulomb's, with the slip v at the end of the step, which obeys
         v = |free| - mobility (limit + D v²); `free` is the slip without any. So no drag bounds the step."""
-        drag = bodies.turbulence[contact.surface[e]] * contact.length[e] * time_step
+        drag = bodies.turbulence[read(contact.surface, e)] * read(contact.length, e) * time_step
         left = wp.max(wp.abs(free) - limit * mobility, F(0.0))
         slip = F(2.0) * left / (F(1.0) + wp.sqrt(F(1.0) + F(4.0) * drag * mobility * left))
         return drag * slip * slip
@@ -291,9 +298,9 @@ def make_contact(
     @wp.func
     def relax(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F):
         """Bring one place's impulses to what the velocities there now call for."""
-        inverse = contact.inverse[e]
-        n = contact.normal[e]
-        body = contact.body[e]
+        inverse = read(contact.inverse, e)
+        n = read(contact.normal, e)
+        body = read(contact.body, e)
         surface = X()
         give_way = F(0.0)
         give_way_along = F(0.0)
@@ -308,9 +315,9 @@ def make_contact(
                     give_way_along = inverse_body * n[1] * n[1]
         velocity = seen(contact, e, grid, parameters)
         solid_velocity = solid_of(velocity) - surface
-        old = contact.solid[e]
+        old = read(contact.solid, e)
         new = wp.max(old - wp.dot(solid_velocity, n) / (inverse + give_way), F(0.0))
-        contact.solid[e] = new
+        write(contact.solid, e, new)
         change = new - old
         given = change * n
         push = -change * n
@@ -320,27 +327,27 @@ def make_contact(
             liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
             liquid_inverse = inverse / parameters.liquid_ratio
-            old_liquid = contact.liquid[e]
+            old_liquid = read(contact.liquid, e)
             new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
-            contact.liquid[e] = new_liquid
+            write(contact.liquid, e, new_liquid)
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
             liquid_given = (liquid_change / parameters.liquid_ratio) * n
         if FRICTION:
-            friction = bodies.friction[contact.surface[e]]
+            friction = bodies.friction[read(contact.surface, e)]
             rubs = friction > F(0.0)
             if TURBULENCE:
-                rubs = rubs or bodies.turbulence[contact.surface[e]] > F(0.0)
+                rubs = rubs or bodies.turbulence[read(contact.surface, e)] > F(0.0)
             if rubs:
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     alone_inverse = inverse / parameters.filling_ratio
-                    old_alone = contact.alone[e]
+                    old_alone = read(contact.alone, e)
                     new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
-                    contact.alone[e] = new_alone
+                    write(contact.alone, e, new_alone)
                     change_alone = (new_alone - old_alone) / parameters.filling_ratio
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
-                    effective(contact, contact.before[e]) + effective(contact, contact.after[e])
+                    effective(contact, read(contact.before, e)) + effective(contact, read(contact.after, e))
                 )
                 limit = friction * wp.max(normal_force, F(0.0))
                 inertia = F(1.0)
@@ -349,12 +356,12 @@ def make_contact(
                     share = drag_share(parameters, time_step)
                     inertia += parameters.liquid_ratio * share
                 slip = slip_along(solid_velocity, n)
-                old_rub = contact.rubbed[e]
+                old_rub = read(contact.rubbed, e)
                 mobility = inverse / inertia + give_way_along
                 if TURBULENCE:
                     limit += turbulent(contact, e, bodies, slip - old_rub * mobility, limit, mobility, time_step)
                 new_rub = limited(old_rub - slip / mobility, limit)
-                contact.rubbed[e] = new_rub
+                write(contact.rubbed, e, new_rub)
                 rub = new_rub - old_rub
                 push -= along(rub, n)
                 given += along(rub / inertia, n)
@@ -367,59 +374,59 @@ def make_contact(
         react(bodies, body, push)
 
     @wp.func
-    def in_use(grid: Grid, i: wp.int32, j: wp.int32) -> wp.bool:
+    def in_use(grid: Grid, i: wp.int32, j: wp.int32, parameters: Parameters) -> wp.bool:
         """Whether any of the blocks that hold the nodes around one holds material: most places of a long outline are
         dry, and need not look at their nodes."""
-        left = (i - 1) >> wp.static(BLOCK_SHIFT)
-        right = (i + 1) >> wp.static(BLOCK_SHIFT)
+        left = ((i - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = ((i + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
         low = (j - 1) >> wp.static(BLOCK_SHIFT)
         high = (j + 1) >> wp.static(BLOCK_SHIFT)
         return (
-            grid.block[left, low] != 0
-            or grid.block[right, low] != 0
-            or grid.block[left, high] != 0
-            or grid.block[right, high] != 0
+            read(grid.block, left + low) != 0
+            or read(grid.block, right + low) != 0
+            or read(grid.block, left + high) != 0
+            or read(grid.block, right + high) != 0
         )
 
     @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
-        if contact.fixed[e] == 0:
-            at = contact.position[e] + across(displaced(bodies, contact.body[e]))
+        if read(contact.fixed, e) == 0:
+            at = read(contact.position, e) + across(displaced(bodies, read(contact.body, e)))
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
-            contact.first[e] = wp.int32(-1)
+            write(contact.first, e, wp.int32(-1))
             if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
-                if in_use(grid, i, j):
-                    contact.first[e] = (i - 1) * parameters.rows + j - 1
+                if in_use(grid, i, j, parameters):
+                    write(contact.first, e, (i - 1) * parameters.rows + j - 1)
                     contact.weight_x[e] = weights(fx)
                     contact.weight_y[e] = weights(fy)
         inverse = F(0.0)
-        if contact.first[e] >= 0:
+        if read(contact.first, e) >= 0:
             inverse = inverse_mass(contact, e, grid, parameters)
-        contact.inverse[e] = inverse
+        write(contact.inverse, e, inverse)
 
     @wp.func
     def recall(contact: Contact, e: wp.int32, again: F):
         """Impulses to begin with: the forces of the step before, or none where nothing is."""
-        share = wp.where(contact.inverse[e] > F(0.0), again, F(0.0))
-        contact.solid[e] = share * contact.solid[e]
+        share = wp.where(read(contact.inverse, e) > F(0.0), again, F(0.0))
+        write(contact.solid, e, share * read(contact.solid, e))
         if TWO_PHASE:
-            contact.liquid[e] = share * contact.liquid[e]
+            write(contact.liquid, e, share * read(contact.liquid, e))
         if CARRIED:
-            contact.alone[e] = share * contact.alone[e]
+            write(contact.alone, e, share * read(contact.alone, e))
         if FRICTION:
-            contact.rubbed[e] = share * contact.rubbed[e]
+            write(contact.rubbed, e, share * read(contact.rubbed, e))
 
     @wp.func
     def add(contact: Contact, first: wp.int32, share: wp.float64, e: wp.int32):
         """A share of the place's impulses, to the sums of a slot."""
-        wp.atomic_add(contact.taken, first + wp.static(SLOT_NORMAL), share * wp.float64(contact.solid[e]))
+        wp.atomic_add(contact.taken, first + wp.static(SLOT_NORMAL), share * wp.float64(read(contact.solid, e)))
         if TWO_PHASE:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.liquid[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(read(contact.liquid, e)))
         elif CARRIED:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.alone[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(read(contact.alone, e)))
         if RUBS_ALONG:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(contact.rubbed[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(read(contact.rubbed, e)))
 
     @wp.func
     def note(contact: Contact, e: wp.int32, slot: wp.int32, surface: wp.int32, force: X):
@@ -444,10 +451,10 @@ def make_contact(
         """Tell the transfer scheme, and record the impulse."""
         give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
         force = on_body(contact, e)
-        surface = contact.surface[e]
+        surface = read(contact.surface, e)
         for axis in range(wp.static(DIMENSIONS)):
             wp.atomic_add(reactions, wp.static(DIMENSIONS) * surface + axis, wp.float64(force[axis]))
-        slot = contact.slot[e]
+        slot = read(contact.slot, e)
         if slot >= 0:
             note(contact, e, slot, surface, force)
 
@@ -468,7 +475,7 @@ def make_contact(
             for e in range(contact.start[group], contact.start[group + 1]):
                 inverse = inverse_mass(contact, e, grid, parameters)
                 if inverse > F(0.0):
-                    contact.inverse[e] = inverse
+                    write(contact.inverse, e, inverse)
                     recall(contact, e, F(0.0))
                     relax(contact, e, bodies, grid, parameters, time_step)
                     finish(contact, e, grid, parameters, time_step, book.reactions)
@@ -508,12 +515,12 @@ def make_contact(
         meet()
         for c in range(contact.colours):
             for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if contact.inverse[e] > F(0.0):
+                if read(contact.inverse, e) > F(0.0):
                     give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
                     if CARRIED:
-                        alone = contact.alone[e] / parameters.filling_ratio
-                        give_alone(contact, e, alone * contact.normal[e], grid, parameters)
-                    react(bodies, contact.body[e], on_body(contact, e))
+                        alone = read(contact.alone, e) / parameters.filling_ratio
+                        give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
+                    react(bodies, read(contact.body, e), on_body(contact, e))
             meet()
         if lane == 0:
             yield_to_flow(bodies)
@@ -524,7 +531,7 @@ def make_contact(
             for step in range(contact.colours):
                 c = wp.where(sweep % 2 == 0, step, contact.colours - 1 - step)
                 for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                    if contact.inverse[e] > F(0.0):
+                    if read(contact.inverse, e) > F(0.0):
                         relax(contact, e, bodies, grid, parameters, time_step)
                 meet()
                 if SLIDING:
@@ -541,7 +548,7 @@ def make_contact(
                 meet()
         for c in range(contact.colours):
             for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if contact.inverse[e] > F(0.0):
+                if read(contact.inverse, e) > F(0.0):
                     finish(contact, e, grid, parameters, time_step, book.reactions)
             meet()
         if lane == 0:

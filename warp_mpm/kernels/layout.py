@@ -203,7 +203,9 @@ def layout(effects: Effects) -> SimpleNamespace:
     P = wp.types.vector(PIECE, scalar)
     W = wp.types.vector(3**dimensions, scalar)  # of the nodes around a place of contact
     array = wp.array
-    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, W=W, components=components)
+    types = SimpleNamespace(
+        effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, W=W, components=components
+    )
     types.dimensions, types.X, types.X64, types.T, types.G, types.R = dimensions, X, X64, T, G, R
 
     points: dict[str, Any] = {
