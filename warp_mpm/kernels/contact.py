@@ -298,7 +298,9 @@ def make_contact(
     @wp.func
     def relax(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F):
         """Bring one place's impulses to what the velocities there now call for."""
+        # Divisions by what is the same for all places are written such that the compiler forms their inverse once.
         inverse = read(contact.inverse, e)
+        mass = F(1.0) / inverse
         n = read(contact.normal, e)
         body = read(contact.body, e)
         surface = X()
@@ -316,7 +318,10 @@ def make_contact(
         velocity = seen(contact, e, grid, parameters)
         solid_velocity = solid_of(velocity) - surface
         old = read(contact.solid, e)
-        new = wp.max(old - wp.dot(solid_velocity, n) / (inverse + give_way), F(0.0))
+        effective_mass = mass
+        if SLIDING:
+            effective_mass = F(1.0) / (inverse + give_way)
+        new = wp.max(old - wp.dot(solid_velocity, n) * effective_mass, F(0.0))
         write(contact.solid, e, new)
         change = new - old
         given = change * n
@@ -326,13 +331,15 @@ def make_contact(
         if TWO_PHASE:
             liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
-            liquid_inverse = inverse / parameters.liquid_ratio
+            liquid_mass = parameters.liquid_ratio * mass
+            if SLIDING:
+                liquid_mass = liquid_mass / (F(1.0) + liquid_mass * give_way)
             old_liquid = read(contact.liquid, e)
-            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
+            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) * liquid_mass, F(0.0))
             write(contact.liquid, e, new_liquid)
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
-            liquid_given = (liquid_change / parameters.liquid_ratio) * n
+            liquid_given = (liquid_change * (F(1.0) / parameters.liquid_ratio)) * n
         if FRICTION:
             friction = bodies.friction[read(contact.surface, e)]
             rubs = friction > F(0.0)
@@ -341,11 +348,10 @@ def make_contact(
             if rubs:
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
-                    alone_inverse = inverse / parameters.filling_ratio
                     old_alone = read(contact.alone, e)
-                    new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
+                    new_alone = wp.max(old_alone - wp.dot(alone, n) * (parameters.filling_ratio * mass), F(0.0))
                     write(contact.alone, e, new_alone)
-                    change_alone = (new_alone - old_alone) / parameters.filling_ratio
+                    change_alone = (new_alone - old_alone) * (F(1.0) / parameters.filling_ratio)
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
                     effective(contact, read(contact.before, e)) + effective(contact, read(contact.after, e))
                 )
@@ -357,16 +363,20 @@ def make_contact(
                     inertia += parameters.liquid_ratio * share
                 slip = slip_along(solid_velocity, n)
                 old_rub = read(contact.rubbed, e)
-                mobility = inverse / inertia + give_way_along
+                per_inertia = F(1.0) / inertia
+                mobility = inverse * per_inertia + give_way_along
+                mass_along = inertia * mass
+                if SLIDING:
+                    mass_along = F(1.0) / mobility
                 if TURBULENCE:
                     limit += turbulent(contact, e, bodies, slip - old_rub * mobility, limit, mobility, time_step)
-                new_rub = limited(old_rub - slip / mobility, limit)
+                new_rub = limited(old_rub - slip * mass_along, limit)
                 write(contact.rubbed, e, new_rub)
                 rub = new_rub - old_rub
                 push -= along(rub, n)
-                given += along(rub / inertia, n)
+                given += along(rub * per_inertia, n)
                 if TWO_PHASE:
-                    liquid_given += along(share * rub / inertia, n)
+                    liquid_given += along(rub * (share * per_inertia), n)
         give(contact, e, of_phases(given, liquid_given), grid, parameters)
         if CARRIED:
             if change_alone != F(0.0):
