@@ -38,10 +38,6 @@ MOST = 100
 """Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
 the flow."""
 
-NODES = {2: 9, 3: 27}
-"""Around a place, by the number of dimensions, counted column by column. A loop of more than three rounds is not
-written out: contact is half of what there is to compile, and a small share of a step."""
-
 REACHED = 0.75
 """Share of a place's weights that must lie on nodes with mass before the flow counts as there: more than the half that
 lies on the nodes before the surface, which a flow has that is still to come. From 0.6 to 0.9 case 1 at 0.2 m slides as
@@ -81,7 +77,7 @@ def make_contact(
     slip_along, limited, along, across = vectors.slip_along, vectors.limited, vectors.along, vectors.across
     DIMENSIONS = types.dimensions
     SPATIAL = DIMENSIONS == 3
-    AROUND = NODES[DIMENSIONS]
+    LAYERS = 3 if SPATIAL else 1
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
@@ -146,13 +142,14 @@ def make_contact(
         first = read(contact.first, e)
         column = first / parameters.rows
         row = first - column * parameters.rows
-        for k in range(AROUND):
-            share = per_mass[k]
-            if share > F(0.0):
-                i = column + (k / 3) % 3
-                if SPATIAL:
-                    i += (k / 9) * parameters.columns
-                receive(grid, i, row + k % 3, share * impulse)
+        for q in range(wp.static(LAYERS)):
+            for k in range(3):
+                for m in range(3):
+                    share = per_mass[9 * q + 3 * k + m]
+                    if share > F(0.0):
+                        receive(grid, column + k, row + m, share * impulse)
+            if SPATIAL:
+                column += parameters.columns
 
     @wp.func
     def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
@@ -401,17 +398,18 @@ def make_contact(
     @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
+        wet = wp.bool(True)
         if read(contact.fixed, e) == 0:
             at = read(contact.position, e) + across(displaced(bodies, read(contact.body, e)))
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
             write(contact.first, e, wp.int32(-1))
             if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
-                if in_use(grid, i, j, parameters):
-                    write(contact.first, e, (i - 1) * parameters.rows + j - 1)
-                    contact.weight_x[e] = weights(fx)
-                    contact.weight_y[e] = weights(fy)
+                write(contact.first, e, (i - 1) * parameters.rows + j - 1)
+                contact.weight_x[e] = weights(fx)
+                contact.weight_y[e] = weights(fy)
+                wet = in_use(grid, i, j, parameters)
         inverse = F(0.0)
-        if read(contact.first, e) >= 0:
+        if read(contact.first, e) >= 0 and wet:
             inverse = inverse_mass(contact, e, grid, parameters)
         write(contact.inverse, e, inverse)
 
