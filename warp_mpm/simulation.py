@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from .channel import Channel
-from .discretization import MaterialPoints, material_points
+from .discretization import MaterialPoints, Span, material_points
 from .effect_rules import derive_effects, kind_of
 from .grid import fit_grid
 from .kernels import layout as at
@@ -34,7 +34,7 @@ from .simulator.bodies.loads import Patches, slots_of
 from .simulator.bodies.of_scene import BARRIER, scene_bodies
 from .simulator.step import LEDGER, START, Launch, launches
 from .state import saved
-from .state.arrays import arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
+from .state.arrays import Group, arrival_arrays, clock_arrays, grid_arrays, memory_for, point_arrays, span_of
 from .state.divergence import SimulationDiverged, diverging, what_diverged, what_is_no_number
 from .state.loads import LoadsNow
 from .state.parameters import kernel_parameters, tell_nodes
@@ -71,7 +71,7 @@ INTERVAL = ("begin", "reactions", "turned", "taken")
 ARRIVED = ("conveyed", "inflow")
 """Arrays of an inflow that change during a run."""
 
-GROWTHS = 32
+GROWTHS = 12
 """Times at most that a run with an inflow is captured anew, for more points."""
 
 LOADS = ("taken", "turned")
@@ -270,10 +270,13 @@ class Simulation:
             "book": self._book,
         }
         self._entry = initial.entry[initial.there :]
-        self._counts = {"one": 1, "workers": self._workers, "points": self._expected(0.0)}
+        self._counts = {"one": 1, "workers": self._workers}
         if self.effects.bodies:
             self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
+        self._in_flow = (0, 0, 0)
+        """Entries FLOW_... of what the kernels over the flow go over, were all points one span."""
+        self._make_room(0.0)
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
         self._kernels_of_a_step: tuple[str, ...] = ()
@@ -306,20 +309,6 @@ class Simulation:
             device=device,
         )
         self._points, self._point_arrays = points.structure, points.arrays
-        # Points of a material lie one after the other, and kernels go over one such span after the other, each with
-        # numbers that are the same for all of it: a loop that looked them up at each point would not be vectorised.
-        self._spans = [
-            (part, {"points": self._points, "parameters": self._parameters})
-            if len(initial.spans) == 1
-            else (
-                part,
-                {
-                    "points": span_of(points, types, part.begin, part.end),
-                    "parameters": self._of_materials[part.material],
-                },
-            )
-            for part in initial.spans
-        ]
         grid = grid_arrays(self.bodies, effects, types, self.grid, device=device)
         self._grid, self._grid_arrays = grid.structure, grid.arrays
         solid = body_arrays(self.bodies, effects, types, self.grid, scenario.gravity.vector, device=device)
@@ -337,9 +326,11 @@ class Simulation:
             self._arrival, self._arrival_arrays = arrival.structure, arrival.arrays
         surfaces = sum(len(body.surfaces) for body in self.bodies)
         self._clock_arrays = clock_arrays(scenario, effects, initial, surfaces=surfaces, device=device)
-        self._book = self._types.Book()
-        for name in at.BOOK:
-            setattr(self._book, name, self._clock_arrays[name])
+        self._spans = [
+            (part, self._span_of(number, part, points if len(initial.spans) > 1 else None))
+            for number, part in enumerate(initial.spans)
+        ]
+        self._book = self._spans[0][1]["book"]
         self._clock = self._clock_arrays["clock"]
         self._counters = self._clock_arrays["counters"]
         self._limiters = self._clock_arrays["limiters"]
@@ -359,6 +350,21 @@ class Simulation:
             self._seen = {name: array.numpy() for name, array in watched.items()}
             self._seen |= {name: self._contact_arrays[name].numpy() for name in LOADS if name in self._contact_arrays}
 
+    def _span_of(self, number: int, part: Span, points: Group | None) -> dict[str, Any]:
+        """What kernels over the points of one material are launched with; without `points`, over all of them.
+
+        Points of a material lie one after the other, and kernels go over one such span after the other, each with
+        numbers that are the same for all of it: a loop that looked them up at each point would not be vectorised.
+        """
+        book = self._types.Book()
+        for name in at.BOOK:
+            setattr(book, name, self._clock_arrays[name])
+        if points is None:
+            return {"points": self._points, "parameters": self._parameters, "book": book}
+        book.flow = self._clock_arrays["flow"][number * at.FLOW_SIZE : (number + 1) * at.FLOW_SIZE]
+        own = span_of(points, self._types, part.begin, part.end)
+        return {"points": own, "parameters": self._of_materials[part.material], "book": book}
+
     # -- stepping ----------------------------------------------------------------------------------------------
 
     def _launch(self, launch: Launch, dim: int, arguments: Sequence[Any], kernels: Any = None) -> None:
@@ -371,7 +377,7 @@ class Simulation:
 
     def _step(self) -> None:
         for launch in launches(self.effects):
-            if launch.over == "points":
+            if launch.over in ("points", "flow"):
                 self._launch_over_points(launch)
             else:
                 self._launch(launch, self._counts[launch.over], [self._arguments[name] for name in launch.takes])
@@ -380,10 +386,15 @@ class Simulation:
         """Once for each span of points of one material, as far as they can have arrived."""
         for part, own in self._spans:
             arguments = self._arguments | own
-            count = self._workers if launch is LEDGER else min(self._counts["points"], part.end) - part.begin
+            count = min(self._counts["points"], part.end) - part.begin
             kernels = self._kernels.of_kinds[self._kinds[part.material]]
             if count > 0 and hasattr(kernels, launch.kernel):  # some are only another kind's
-                self._launch(launch, count, [arguments[name] for name in launch.takes], kernels)
+                threads = {"workers": self._workers, "flow": self._in_turn(count)}.get(launch.over, count)
+                self._launch(launch, threads, [arguments[name] for name in launch.takes], kernels)
+
+    def _in_turn(self, count: int) -> int:
+        """Threads of a kernel over the flow, for so many points."""
+        return 1 if self.device.is_cpu else count
 
     def _start(self) -> None:
         self._launch(START, 1, [self._arguments[name] for name in START.takes])
@@ -396,23 +407,36 @@ class Simulation:
         self._sums.zero_()
         self._launch_over_points(LEDGER)
 
-    def _expected(self, until: float) -> int:
-        """Material points that kernels go over up to a time [s]: what has yet to arrive comes last, and later."""
-        inflow = self.scenario.flow.inflow
-        if inflow is None:
-            return self.material_points
-        waiting = len(self._entry)
-        share = max(1, -(-waiting // GROWTHS))
-        # On the device the way is summed up in other pieces.
-        come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
-        return self.material_points - waiting + min(waiting, -(-come // share) * share)
-
     def _make_room(self, until: float) -> None:
-        """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing."""
-        expected = self._expected(until)
-        if expected > self._counts["points"]:
-            self._counts["points"] = expected
+        """Let the kernels go over all points that may have arrived by a time [s]: those that wait cost nothing.
+
+        Those over the flow are told how many these are. `update` has a thread for each point, so that it is captured
+        anew, for some more points at a time.
+        """
+        inflow, waiting = self.scenario.flow.inflow, len(self._entry)
+        come = 0
+        if inflow is not None:
+            # On the device the way is summed up in other pieces.
+            come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
+        there = self.material_points - waiting
+        share = max(1, -(-waiting // GROWTHS))
+        threads = there + min(waiting, -(-come // share) * share)
+        if threads > self._counts.get("points", -1):
+            self._counts["points"] = threads
             self._graph = None
+        end, arriving = there + come, self._in_flow[at.FLOW_ARRIVING]
+        if inflow is not None:
+            state = self._point_arrays["inside"].numpy()[arriving:end]
+            not_yet = (state == at.WAITING) | (state == at.HELD)
+            arriving += int(not_yet.argmax()) if not_yet.any() else len(state)
+        in_flow = (end, arriving, self._in_turn(self._counts["points"]))
+        if in_flow != self._in_flow:
+            self._in_flow = in_flow
+            of_spans = [
+                (min(end, part.end) - part.begin, max(arriving - part.begin, 0), in_flow[at.FLOW_STEP])
+                for part, _ in self._spans
+            ]
+            self._clock_arrays["flow"].assign(np.array(of_spans, dtype=np.int32).ravel())
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -900,6 +924,7 @@ class Simulation:
         state = saved.unpacked(data, self._state())
         for name, array in self._state_arrays().items():
             array.assign(state[name])
+        self._in_flow = (0, 0, 0)  # found anew
         self._initial_momentum = state["initial_momentum"].tolist()
         (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
         self._since = replace(

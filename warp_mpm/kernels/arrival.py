@@ -14,6 +14,9 @@ from .layout import (
     CONVEYED_STRETCH,
     CONVEYED_STRETCH_BEFORE,
     CONVEYED_WAY,
+    FLOW_ARRIVING,
+    FLOW_END,
+    FLOW_STEP,
     HELD,
     INFLOW_ENERGY,
     INFLOW_LIQUID_MASS,
@@ -147,13 +150,17 @@ def make_arrival(
         energy = wp.float64(F(0.5) * wp.dot(v, v) - wp.dot(parameters.gravity, x))
         wp.atomic_add(arrival.inflow, wp.static(INFLOW_ENERGY), total * energy)
 
-    @wp.kernel(module=module)
-    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book):
+    @wp.func
+    def convoy(
+        p: wp.int32,
+        state: wp.int32,
+        points: Points,
+        grid: Grid,
+        parameters: Parameters,
+        arrival: Arrival,
+        book: Book,
+    ):
         """Move the points that approach as the conveyor does; those whose time has come begin to, or are let go."""
-        p = wp.tid()
-        state = read(points.inside, p)
-        if state != wp.static(WAITING) and state != wp.static(HELD):
-            return
         pace = wp.float64(read(points.pace, p))
         x = read(points.position, p)
         way = arrival.conveyed[wp.static(CONVEYED_WAY)]
@@ -193,5 +200,13 @@ def make_arrival(
         points.inside[p] = wp.static(HELD)
         if at >= arrival.section:
             let_go(points, p, place, v, parameters, arrival, book)
+
+    @wp.kernel(module=module)
+    def hold(points: Points, grid: Grid, parameters: Parameters, arrival: Arrival, book: Book):
+        begin = book.flow[wp.static(FLOW_ARRIVING)] + wp.tid()
+        for p in range(begin, book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+            state = read(points.inside, p)
+            if state == wp.static(WAITING) or state == wp.static(HELD):
+                convoy(p, state, points, grid, parameters, arrival, book)
 
     return hold

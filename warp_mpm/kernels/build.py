@@ -13,6 +13,7 @@ from ..effects import Effects
 from ..simulator.bodies.kernels import make_body_functions
 from ..simulator.laws.law import all_functions as law_functions
 from ..simulator.schemes.scheme import all_functions as scheme_functions
+from .around import make_around
 from .arrival import make_conveyor
 from .clock import make_clock
 from .constitutive import make_constitutive
@@ -61,7 +62,7 @@ def build_kernels(effects: Effects) -> SimpleNamespace:
     shapes = make_shape_functions(types)
     elementary = make_elementary(types)
     vectors = make_vectors(types)
-    tools = SimpleNamespace(**elementary.__dict__, **shapes.__dict__, **vectors.__dict__)
+    tools = SimpleNamespace(**elementary.__dict__, **make_around(types).__dict__, **shapes.__dict__, **vectors.__dict__)
     types.scheme = SimpleNamespace(**scheme_functions(effects.scheme, types, tools))
     bodies = make_body_functions(types, elementary) if effects.bodies else None
     of_scheme = effects.scheme.kernels(types, tools, module)

@@ -10,6 +10,8 @@ from .arrival import make_arrival
 from .elementary import make_elementary
 from .layout import (
     DIVERGED,
+    FLOW_END,
+    FLOW_STEP,
     GAPS_BOUNDED,
     INSIDE,
     LEFT_ENERGY,
@@ -143,8 +145,9 @@ def make_constitutive(
             result = result and sz >= margin and sz < F(parameters.layers) - margin
         return result
 
-    @wp.kernel(module=module)
-    def advect(
+    @wp.func
+    def carry(
+        p: wp.int32,
         points: Points,
         grid: Grid,
         parameters: Parameters,
@@ -152,9 +155,6 @@ def make_constitutive(
         book: Book,
     ):
         """Bring the corners' averages to the points, then move these with the flow and out of what is solid."""
-        p = wp.tid()
-        if read(points.inside, p) != wp.static(INSIDE):
-            return
         time_step = F(book.clock[wp.static(TIME_STEP)])
         shift = F(grid.shift[0])
         x = read(points.position, p)
@@ -235,6 +235,12 @@ def make_constitutive(
                 if gap > largest:
                     write(points.solid_gap, p, largest)
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+
+    @wp.kernel(module=module)
+    def advect(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+            if read(points.inside, p) == wp.static(INSIDE):
+                carry(p, points, grid, parameters, bodies, book)
 
     @wp.func
     def settle(
@@ -336,12 +342,9 @@ def make_constitutive(
             if OPENS:
                 write(points.solid_gap, p, gap)
 
-    @wp.kernel(module=module)
-    def bound(points: Points, parameters: Parameters, book: Book):
+    @wp.func
+    def limit(p: wp.int32, points: Points, parameters: Parameters, book: Book):
         """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
-        p = wp.tid()
-        if read(points.inside, p) <= 0:
-            return
         grains = parameters.grain_share * read(points.reference_volume, p)
         volume = read(points.volume, p)
         if volume < grains:
@@ -357,6 +360,12 @@ def make_constitutive(
                 if read(points.liquid_strain, p) > largest:
                     write(points.liquid_strain, p, largest)
                     wp.atomic_add(book.limiters, wp.static(GAPS_BOUNDED), wp.float64(1.0))
+
+    @wp.kernel(module=module)
+    def bound(points: Points, parameters: Parameters, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+            if read(points.inside, p) > 0:
+                limit(p, points, parameters, book)
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
     if effects.arriving:

@@ -18,6 +18,7 @@ from typing import Any
 
 import warp as wp
 
+from .around import make_at_places
 from .elementary import make_elementary
 from .layout import (
     BARRIER_ITERATIONS,
@@ -37,10 +38,6 @@ SWEEPS = 4
 MOST = 100
 """Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
 the flow."""
-
-NODES = {2: 9, 3: 27}
-"""Around a place, by the number of dimensions, counted column by column. A loop of more than three rounds is not
-written out: contact is half of what there is to compile, and a small share of a step."""
 
 WEIGHTLESS = 1e-30
 """Of a ratio of masses, in place of nil."""
@@ -76,13 +73,16 @@ def make_contact(
     IMPLICIT_DRAG = effects.drag == "semi_implicit"
     elementary = make_elementary(types)
     read, write, larger = elementary.read, elementary.write, elementary.larger
+    at_places = make_at_places(types)
+    weigh, rescale, seen_at, give_at = at_places.weigh, at_places.rescale, at_places.seen, at_places.give
     weights, cell_of = shapes.weights, shapes.cell_of
     displaced, look_ahead = bodies_of.displaced, bodies_of.look_ahead
     of_phases, solid_of, liquid_of = vectors.of_phases, vectors.solid_of, vectors.liquid_of
     slip_along, limited, along, across = vectors.slip_along, vectors.limited, vectors.along, vectors.across
     DIMENSIONS = types.dimensions
     SPATIAL = DIMENSIONS == 3
-    AROUND = NODES[DIMENSIONS]
+    LAYERS = 3 if SPATIAL else 1
+    AROUND = types.W._length_
     MATERIALS = "told" in types.grid_fields
     told_of = make_told(types)
     ratio_of_liquid, ratio_of_filling = told_of.ratio_of_liquid, told_of.ratio_of_filling
@@ -90,42 +90,51 @@ def make_contact(
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
     @wp.func
-    def around(contact: Contact, e: wp.int32, wx: V3, wy: V3, k: wp.int32, parameters: Parameters):
-        """Weight and number of the k-th node around a place."""
-        w = wx[(k / 3) % 3] * wy[k % 3]
-        node = contact.first[e] + ((k / 3) % 3) * parameters.rows + k % 3
+    def layer_of(parameters: Parameters) -> wp.int32:
+        """Nodes from a layer to the next."""
+        layer = wp.int32(0)
         if SPATIAL:
-            w *= contact.weight_z[e][k / 9]
-            node += (k / 9) * parameters.layer
-        return w, node
+            layer = parameters.layer
+        return layer
 
     @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
         """sum N_i^2 / m_i of the solid, with weights that add up to one over the nodes that have mass; 0 where the flow
         is not at the surface: too few of the nodes have any."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = F(0.0)
-        total = F(0.0)
+        wz = V3()
+        if SPATIAL:
+            wz = contact.weight_z[e]
+        first = read(contact.first, e)
+        sums = weigh(
+            grid.mass,
+            first,
+            parameters.rows,
+            layer_of(parameters),
+            contact.weight_x[e],
+            contact.weight_y[e],
+            wz,
+            contact.weight,
+            contact.per_mass,
+            e,
+        )
+        result = sums[0]
+        total = sums[1]
         if MATERIALS:
             of_liquid = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    result += w * w / mass
-                    total += w
-                    if MATERIALS:
-                        told = read(grid.told, node) / mass
-                        if TWO_PHASE:
-                            of_liquid += w * ratio_of_liquid(told, parameters)
-                            drag += w * told_drag(told, parameters)
-                        if CARRIED:
-                            filling += w * ratio_of_filling(told, parameters)
-        if MATERIALS:
+            per_mass = contact.per_mass[e]
+            for k in range(AROUND):
+                if per_mass[k] > F(0.0):
+                    node = first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
+                    mass = read(grid.mass, node)
+                    w = per_mass[k] * mass
+                    told = read(grid.told, node) / mass
+                    if TWO_PHASE:
+                        of_liquid += w * ratio_of_liquid(told, parameters)
+                        drag += w * told_drag(told, parameters)
+                    if CARRIED:
+                        filling += w * ratio_of_filling(told, parameters)
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
@@ -137,68 +146,50 @@ def make_contact(
                 contact.filling_ratio[e] = larger(filling * inverse_total, F(wp.static(WEIGHTLESS)))
         if total < F(wp.static(REACHED)):
             result = F(0.0)
-        elif contact.fixed[e] == 0:
-            contact.weight_x[e] = wx / total
-            result = result / (total * total)
+        elif read(contact.fixed, e) == 0:
+            by = F(1.0) / total
+            rescale(contact.weight, contact.per_mass, e, by)
+            result *= by * by
         return result
 
     @wp.func
     def seen(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V:
         """Velocities of the flow at the place."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = V()
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.velocity, node)
-        return result
+        return seen_at(grid.velocity, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e)
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        result = X()
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.liquid_alone, node)
-        return result
+        return seen_at(
+            grid.liquid_alone, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e
+        )
 
     @wp.func
     def give(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """Impulses per phase, over the share of the solid's mass that each has, to the nodes."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    write(grid.velocity, node, read(grid.velocity, node) + (w / mass) * impulse)
+        layer = layer_of(parameters)
+        give_at(grid.velocity, read(contact.first, e), parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def give_scheme(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
         """The same to what the transfer scheme keeps."""
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    i = node / parameters.rows
-                    receive(grid, i, node - i * parameters.rows, (w / mass) * impulse)
+        per_mass = contact.per_mass[e]
+        first = read(contact.first, e)
+        column = first / parameters.rows
+        row = first - column * parameters.rows
+        for q in range(wp.static(LAYERS)):
+            for k in range(3):
+                for m in range(3):
+                    share = per_mass[9 * q + 3 * k + m]
+                    if share > F(0.0):
+                        receive(grid, column + k, row + m, share * impulse)
+            if SPATIAL:
+                column += parameters.columns
 
     @wp.func
     def give_alone(contact: Contact, e: wp.int32, impulse: X, grid: Grid, parameters: Parameters):
-        wx = contact.weight_x[e]
-        wy = contact.weight_y[e]
-        for k in range(AROUND):
-            w, node = around(contact, e, wx, wy, k, parameters)
-            if w > F(0.0):
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    write(grid.liquid_alone, node, read(grid.liquid_alone, node) + (w / mass) * impulse)
+        layer = layer_of(parameters)
+        give_at(grid.liquid_alone, read(contact.first, e), parameters.rows, layer, contact.per_mass, e, impulse)
 
     @wp.func
     def liquid_ratio(contact: Contact, e: wp.int32, parameters: Parameters) -> F:
@@ -233,31 +224,31 @@ def make_contact(
     @wp.func
     def whole(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> V:
         """All that the place has given in the step, in the form that `give` takes."""
-        n = contact.normal[e]
-        solid = contact.solid[e] * n
+        n = read(contact.normal, e)
+        solid = read(contact.solid, e) * n
         liquid = X()
         if TWO_PHASE:
-            liquid = (contact.liquid[e] / liquid_ratio(contact, e, parameters)) * n
+            liquid = (read(contact.liquid, e) / liquid_ratio(contact, e, parameters)) * n
             if FRICTION:
                 share = drag_share(contact, e, parameters, time_step)
-                rub = contact.rubbed[e] / (F(1.0) + liquid_ratio(contact, e, parameters) * share)
+                rub = read(contact.rubbed, e) / (F(1.0) + liquid_ratio(contact, e, parameters) * share)
                 solid += along(rub, n)
                 liquid += along(share * rub, n)
         else:
             if FRICTION:
-                solid += along(contact.rubbed[e], n)
+                solid += along(read(contact.rubbed, e), n)
         return of_phases(solid, liquid)
 
     @wp.func
     def on_body(contact: Contact, e: wp.int32) -> X:
         """Impulse of the flow on the surface, Eq. (A14)."""
-        n = contact.normal[e]
-        total = contact.solid[e]
+        n = read(contact.normal, e)
+        total = read(contact.solid, e)
         if TWO_PHASE:
-            total += contact.liquid[e]
+            total += read(contact.liquid, e)
         result = -total * n
         if FRICTION:
-            result -= along(contact.rubbed[e], n)
+            result -= along(read(contact.rubbed, e), n)
         return result
 
     @wp.func
@@ -341,18 +332,18 @@ def make_contact(
     @wp.func
     def effective(contact: Contact, e: wp.int32) -> F:
         """Normal impulse less what the liquid's pressure carries."""
-        result = contact.solid[e]
+        result = read(contact.solid, e)
         if TWO_PHASE:
-            result += contact.liquid[e]
+            result += read(contact.liquid, e)
         if CARRIED:
-            result -= contact.alone[e]
+            result -= read(contact.alone, e)
         return result
 
     @wp.func
     def turbulent(contact: Contact, e: wp.int32, bodies: Bodies, free: F, limit: F, mobility: F, time_step: F) -> F:
         """Impulse D v² of Voellmy's friction beside Coulomb's, with the slip v at the end of the step, which obeys
         v = |free| - mobility (limit + D v²); `free` is the slip without any. So no drag bounds the step."""
-        drag = bodies.turbulence[contact.surface[e]] * contact.length[e] * time_step
+        drag = bodies.turbulence[read(contact.surface, e)] * read(contact.length, e) * time_step
         left = wp.max(wp.abs(free) - limit * mobility, F(0.0))
         slip = F(2.0) * left / (F(1.0) + wp.sqrt(F(1.0) + F(4.0) * drag * mobility * left))
         return drag * slip * slip
@@ -360,9 +351,11 @@ def make_contact(
     @wp.func
     def relax(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters, time_step: F):
         """Bring one place's impulses to what the velocities there now call for."""
-        inverse = contact.inverse[e]
-        n = contact.normal[e]
-        body = contact.body[e]
+        # Divisions by what is the same for all places are written such that the compiler forms their inverse once.
+        inverse = read(contact.inverse, e)
+        mass = F(1.0) / inverse
+        n = read(contact.normal, e)
+        body = read(contact.body, e)
         surface = X()
         give_way = F(0.0)
         give_way_along = F(0.0)
@@ -377,9 +370,12 @@ def make_contact(
                     give_way_along = inverse_body * n[1] * n[1]
         velocity = seen(contact, e, grid, parameters)
         solid_velocity = solid_of(velocity) - surface
-        old = contact.solid[e]
-        new = wp.max(old - wp.dot(solid_velocity, n) / (inverse + give_way), F(0.0))
-        contact.solid[e] = new
+        old = read(contact.solid, e)
+        effective_mass = mass
+        if SLIDING:
+            effective_mass = F(1.0) / (inverse + give_way)
+        new = wp.max(old - wp.dot(solid_velocity, n) * effective_mass, F(0.0))
+        write(contact.solid, e, new)
         change = new - old
         given = change * n
         push = -change * n
@@ -389,29 +385,30 @@ def make_contact(
             liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
             ratio = liquid_ratio(contact, e, parameters)
-            liquid_inverse = inverse / ratio
-            old_liquid = contact.liquid[e]
-            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
-            contact.liquid[e] = new_liquid
+            liquid_mass = ratio * mass
+            if SLIDING:
+                liquid_mass = liquid_mass / (F(1.0) + liquid_mass * give_way)
+            old_liquid = read(contact.liquid, e)
+            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) * liquid_mass, F(0.0))
+            write(contact.liquid, e, new_liquid)
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
-            liquid_given = (liquid_change / ratio) * n
+            liquid_given = (liquid_change * (F(1.0) / ratio)) * n
         if FRICTION:
-            friction = bodies.friction[contact.surface[e]]
+            friction = bodies.friction[read(contact.surface, e)]
             rubs = friction > F(0.0)
             if TURBULENCE:
-                rubs = rubs or bodies.turbulence[contact.surface[e]] > F(0.0)
+                rubs = rubs or bodies.turbulence[read(contact.surface, e)] > F(0.0)
             if rubs:
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     filling = filling_ratio(contact, e, parameters)
-                    alone_inverse = inverse / filling
-                    old_alone = contact.alone[e]
-                    new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
-                    contact.alone[e] = new_alone
-                    change_alone = (new_alone - old_alone) / filling
+                    old_alone = read(contact.alone, e)
+                    new_alone = wp.max(old_alone - wp.dot(alone, n) * (filling * mass), F(0.0))
+                    write(contact.alone, e, new_alone)
+                    change_alone = (new_alone - old_alone) * (F(1.0) / filling)
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
-                    effective(contact, contact.before[e]) + effective(contact, contact.after[e])
+                    effective(contact, read(contact.before, e)) + effective(contact, read(contact.after, e))
                 )
                 limit = friction * wp.max(normal_force, F(0.0))
                 inertia = F(1.0)
@@ -420,17 +417,21 @@ def make_contact(
                     share = drag_share(contact, e, parameters, time_step)
                     inertia += ratio * share
                 slip = slip_along(solid_velocity, n)
-                old_rub = contact.rubbed[e]
-                mobility = inverse / inertia + give_way_along
+                old_rub = read(contact.rubbed, e)
+                per_inertia = F(1.0) / inertia
+                mobility = inverse * per_inertia + give_way_along
+                mass_along = inertia * mass
+                if SLIDING:
+                    mass_along = F(1.0) / mobility
                 if TURBULENCE:
                     limit += turbulent(contact, e, bodies, slip - old_rub * mobility, limit, mobility, time_step)
-                new_rub = limited(old_rub - slip / mobility, limit)
-                contact.rubbed[e] = new_rub
+                new_rub = limited(old_rub - slip * mass_along, limit)
+                write(contact.rubbed, e, new_rub)
                 rub = new_rub - old_rub
                 push -= along(rub, n)
-                given += along(rub / inertia, n)
+                given += along(rub * per_inertia, n)
                 if TWO_PHASE:
-                    liquid_given += along(share * rub / inertia, n)
+                    liquid_given += along(rub * (share * per_inertia), n)
         give(contact, e, of_phases(given, liquid_given), grid, parameters)
         if CARRIED:
             if change_alone != F(0.0):
@@ -438,60 +439,60 @@ def make_contact(
         react(bodies, body, push)
 
     @wp.func
-    def in_use(grid: Grid, i: wp.int32, j: wp.int32) -> wp.bool:
+    def in_use(grid: Grid, i: wp.int32, j: wp.int32, parameters: Parameters) -> wp.bool:
         """Whether any of the blocks that hold the nodes around one holds material: most places of a long outline are
         dry, and need not look at their nodes."""
-        left = (i - 1) >> wp.static(BLOCK_SHIFT)
-        right = (i + 1) >> wp.static(BLOCK_SHIFT)
+        left = ((i - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = ((i + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
         low = (j - 1) >> wp.static(BLOCK_SHIFT)
         high = (j + 1) >> wp.static(BLOCK_SHIFT)
         return (
-            grid.block[left, low] != 0
-            or grid.block[right, low] != 0
-            or grid.block[left, high] != 0
-            or grid.block[right, high] != 0
+            read(grid.block, left + low) != 0
+            or read(grid.block, right + low) != 0
+            or read(grid.block, left + high) != 0
+            or read(grid.block, right + high) != 0
         )
 
     @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
         wet = wp.bool(True)
-        if contact.fixed[e] == 0:
-            at = contact.position[e] + across(displaced(bodies, contact.body[e]))
+        if read(contact.fixed, e) == 0:
+            at = read(contact.position, e) + across(displaced(bodies, read(contact.body, e)))
             i, j, fx, fy = cell_of(at, F(grid.shift[0]), parameters)
-            contact.first[e] = wp.int32(-1)
+            write(contact.first, e, wp.int32(-1))
             if i >= 1 and j >= 1 and i < parameters.columns - 1 and j < parameters.rows - 1:
-                contact.first[e] = (i - 1) * parameters.rows + j - 1
+                write(contact.first, e, (i - 1) * parameters.rows + j - 1)
                 contact.weight_x[e] = weights(fx)
                 contact.weight_y[e] = weights(fy)
-                wet = in_use(grid, i, j)
+                wet = in_use(grid, i, j, parameters)
         inverse = F(0.0)
-        if contact.first[e] >= 0 and wet:
+        if read(contact.first, e) >= 0 and wet:
             inverse = inverse_mass(contact, e, grid, parameters)
-        contact.inverse[e] = inverse
+        write(contact.inverse, e, inverse)
 
     @wp.func
     def recall(contact: Contact, e: wp.int32, again: F):
         """Impulses to begin with: the forces of the step before, or none where nothing is."""
-        share = wp.where(contact.inverse[e] > F(0.0), again, F(0.0))
-        contact.solid[e] = share * contact.solid[e]
+        share = wp.where(read(contact.inverse, e) > F(0.0), again, F(0.0))
+        write(contact.solid, e, share * read(contact.solid, e))
         if TWO_PHASE:
-            contact.liquid[e] = share * contact.liquid[e]
+            write(contact.liquid, e, share * read(contact.liquid, e))
         if CARRIED:
-            contact.alone[e] = share * contact.alone[e]
+            write(contact.alone, e, share * read(contact.alone, e))
         if FRICTION:
-            contact.rubbed[e] = share * contact.rubbed[e]
+            write(contact.rubbed, e, share * read(contact.rubbed, e))
 
     @wp.func
     def add(contact: Contact, first: wp.int32, share: wp.float64, e: wp.int32):
         """A share of the place's impulses, to the sums of a slot."""
-        wp.atomic_add(contact.taken, first + wp.static(SLOT_NORMAL), share * wp.float64(contact.solid[e]))
+        wp.atomic_add(contact.taken, first + wp.static(SLOT_NORMAL), share * wp.float64(read(contact.solid, e)))
         if TWO_PHASE:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.liquid[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(read(contact.liquid, e)))
         elif CARRIED:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(contact.alone[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_LIQUID), share * wp.float64(read(contact.alone, e)))
         if RUBS_ALONG:
-            wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(contact.rubbed[e]))
+            wp.atomic_add(contact.taken, first + wp.static(SLOT_ALONG), share * wp.float64(read(contact.rubbed, e)))
 
     @wp.func
     def note(contact: Contact, e: wp.int32, slot: wp.int32, surface: wp.int32, force: X):
@@ -516,10 +517,10 @@ def make_contact(
         """Tell the transfer scheme, and record the impulse."""
         give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
         force = on_body(contact, e)
-        surface = contact.surface[e]
+        surface = read(contact.surface, e)
         for axis in range(wp.static(DIMENSIONS)):
             wp.atomic_add(reactions, wp.static(DIMENSIONS) * surface + axis, wp.float64(force[axis]))
-        slot = contact.slot[e]
+        slot = read(contact.slot, e)
         if slot >= 0:
             note(contact, e, slot, surface, force)
 
@@ -540,7 +541,7 @@ def make_contact(
             for e in range(contact.start[group], contact.start[group + 1]):
                 inverse = inverse_mass(contact, e, grid, parameters)
                 if inverse > F(0.0):
-                    contact.inverse[e] = inverse
+                    write(contact.inverse, e, inverse)
                     recall(contact, e, F(0.0))
                     relax(contact, e, bodies, grid, parameters, time_step)
                     finish(contact, e, grid, parameters, time_step, book.reactions)
@@ -580,12 +581,12 @@ def make_contact(
         meet()
         for c in range(contact.colours):
             for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if contact.inverse[e] > F(0.0):
+                if read(contact.inverse, e) > F(0.0):
                     give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
                     if CARRIED:
-                        alone = contact.alone[e] / filling_ratio(contact, e, parameters)
-                        give_alone(contact, e, alone * contact.normal[e], grid, parameters)
-                    react(bodies, contact.body[e], on_body(contact, e))
+                        alone = read(contact.alone, e) / filling_ratio(contact, e, parameters)
+                        give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
+                    react(bodies, read(contact.body, e), on_body(contact, e))
             meet()
         if lane == 0:
             yield_to_flow(bodies)
@@ -596,7 +597,7 @@ def make_contact(
             for step in range(contact.colours):
                 c = wp.where(sweep % 2 == 0, step, contact.colours - 1 - step)
                 for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                    if contact.inverse[e] > F(0.0):
+                    if read(contact.inverse, e) > F(0.0):
                         relax(contact, e, bodies, grid, parameters, time_step)
                 meet()
                 if SLIDING:
@@ -613,7 +614,7 @@ def make_contact(
                 meet()
         for c in range(contact.colours):
             for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if contact.inverse[e] > F(0.0):
+                if read(contact.inverse, e) > F(0.0):
                     finish(contact, e, grid, parameters, time_step, book.reactions)
             meet()
         if lane == 0:

@@ -150,6 +150,16 @@ SLOT_ALONG = 2
 """Along the surface, toward its next slot."""
 SLOT_SIZE = 3
 
+# Which material points kernels over the flow go over, an int32 array that the host fills; no part of the state.
+FLOW_END = 0
+"""Those before this one; what comes later has yet to arrive."""
+FLOW_ARRIVING = 1
+"""All that has arrived comes before this one."""
+FLOW_STEP = 2
+"""Each thread takes every so many of them. A processor's one thread takes them all, in a loop of its own: so it fetches
+once what it needs for every point, which else is a fifth of a kernel's time."""
+FLOW_SIZE = 3
+
 BOOK: dict[str, Any] = {
     "clock": wp.array(dtype=wp.float64),
     "counters": wp.array(dtype=wp.int32),
@@ -158,6 +168,7 @@ BOOK: dict[str, Any] = {
     "reactions": wp.array(dtype=wp.float64),
     "left": wp.array(dtype=wp.float64),
     "sums": wp.array(dtype=wp.float64),
+    "flow": wp.array(dtype=wp.int32),
 }
 """What is kept account of, in one structure. Of a kernel that takes an array by itself, Warp compiles a second version
 for an array with gaps, which is never called; that is a third of the compiler's time. Only `update` needs it so: the
@@ -190,8 +201,11 @@ def layout(effects: Effects) -> SimpleNamespace:
     # Corner sums: volume, and volume times: solid's divergence, excess pressure, its residual, liquid's divergence.
     S = wp.types.vector({"dry": 2, "undrained": 4, "two_phase": 5}[effects.formulation], scalar)
     P = wp.types.vector(PIECE, scalar)
+    W = wp.types.vector(3**dimensions, scalar)  # of the nodes around a place of contact
     array = wp.array
-    types = SimpleNamespace(effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, components=components)
+    types = SimpleNamespace(
+        effects=effects, scalar=scalar, V2=V2, V3=V3, V4=V4, V=V, S=S, P=P, W=W, components=components
+    )
     types.partly_dry = effects.partly_dry
     types.dimensions, types.X, types.X64, types.T, types.G, types.R = dimensions, X, X64, T, G, R
 
@@ -323,7 +337,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         parameters["excess"] = types.M  # what a point of the material tells the nodes, per mass of its solid
         parameters["tells"] = wp.int32  # 1: it is not nil
     bodies = body_fields(effects, scalar, V2, V4, P)
-    contact = contact_fields(effects, scalar, X, V3, R) if effects.bodies else {}
+    contact = contact_fields(effects, scalar, X, V3, W, R) if effects.bodies else {}
 
     arrival: dict[str, Any] = {}
     if effects.arriving:

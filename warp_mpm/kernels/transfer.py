@@ -6,9 +6,12 @@ from typing import Any
 import warp as wp
 
 from ..simulator.bodies.kernels import RUBBED, RUBS
+from .around import make_around
 from .elementary import make_elementary
 from .layout import (
     BLOCK_SHIFT,
+    FLOW_END,
+    FLOW_STEP,
     SPEED_MAX,
     TIME_STEP,
 )
@@ -48,6 +51,9 @@ def make_transfer(
     LAYERS, CORNER_LAYERS = (3, 2) if SPATIAL else (1, 1)
     elementary = make_elementary(types)
     read, write, add, larger = elementary.read, elementary.write, elementary.add, elementary.larger
+
+    nodes = make_around(types)
+    nine, part = nodes.nine, nodes.part
 
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
@@ -107,16 +113,13 @@ def make_transfer(
         mark(grid, left + high, parameters)
         mark(grid, right + high, parameters)
 
-    @wp.kernel(module=module)
-    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
+    @wp.func
+    def spread(p: wp.int32, points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
         """Mass, momentum and internal force of the points to the nodes, the latter two of each phase.
 
         Internal forces per node: solid -sum V (sigma' - (1 - n) p I) grad w, liquid +sum V n p grad w, with p
         compression positive: audit 3.4, action and reaction between the phases included.
         """
-        p = wp.tid()
-        if read(points.inside, p) <= 0:
-            return
         x = read(points.position, p)
         shift = F(grid.shift[0])
         ci, cj, fx, fy = cell_of(x, shift, parameters)
@@ -283,6 +286,12 @@ def make_transfer(
                                 excess = wz[q] * excess + (dz[q] * wx[k] * wy[m]) * along_z
                             add(grid.liquid_alone, node, excess)
 
+    @wp.kernel(module=module)
+    def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+            if read(points.inside, p) > 0:
+                spread(p, points, grid, parameters, bodies, book)
+
     @wp.func
     def mean(w: V3, low: V, middle: V, high: V) -> V:
         return w[0] * low + w[1] * middle + w[2] * high
@@ -299,28 +308,12 @@ def make_transfer(
     @wp.func
     def around(grid: Grid, first: wp.int32, wx: V3, wy: V3, fx: F, fy: F, parameters: Parameters):
         """Of the velocity at the nine nodes of a layer: mean, first moments along x and y, slopes along them."""
-        # Along each of the three columns of nodes first, then across.
-        second = first + parameters.rows
-        third = second + parameters.rows
-        left, left_lean, left_slope = line(
-            wy, fy, read(grid.velocity, first), read(grid.velocity, first + 1), read(grid.velocity, first + 2)
-        )
-        centre, centre_lean, centre_slope = line(
-            wy, fy, read(grid.velocity, second), read(grid.velocity, second + 1), read(grid.velocity, second + 2)
-        )
-        right, right_lean, right_slope = line(
-            wy, fy, read(grid.velocity, third), read(grid.velocity, third + 1), read(grid.velocity, third + 2)
-        )
-        smooth, lean_x, slope_x = line(wx, fx, left, centre, right)
-        lean_y = mean(wx, left_lean, centre_lean, right_lean)
-        return smooth, lean_x, lean_y, slope_x, mean(wx, left_slope, centre_slope, right_slope)
+        all = nine(grid.velocity, first, parameters.rows, fx, fy, wx[0], wx[1], wx[2], wy[0], wy[1], wy[2])
+        return part(all, 0), part(all, 1), part(all, 2), part(all, 3), part(all, 4)
 
-    @wp.kernel(module=module)
-    def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
+    @wp.func
+    def take(p: wp.int32, points: Points, grid: Grid, parameters: Parameters, book: Book):
         """Velocities and velocity gradient from the nodes to the points; volume strain rates to the corners."""
-        p = wp.tid()
-        if read(points.inside, p) <= 0:
-            return
         x = read(points.position, p)
         shift = F(grid.shift[0])
         time_step = F(book.clock[wp.static(TIME_STEP)])
@@ -416,5 +409,11 @@ def make_transfer(
                             add(grid.corner, corner, S(h, h * divergence, h * excess, h * residual))
                         else:
                             add(grid.corner, corner, S(h, h * divergence))
+
+    @wp.kernel(module=module)
+    def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
+        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+            if read(points.inside, p) > 0:
+                take(p, points, grid, parameters, book)
 
     return SimpleNamespace(scatter=scatter, gather=gather)

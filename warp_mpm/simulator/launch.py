@@ -11,9 +11,10 @@ class Launch:
     """One launch of a kernel."""
 
     kernel: str
-    over: Literal["one", "workers", "points", "groups", "lanes"]
-    """What its threads count: workers share the blocks of the grid in use; groups are of places of contact, and lanes
-    share those that are joined."""
+    over: Literal["one", "workers", "points", "flow", "groups", "lanes"]
+    """What its threads count: workers share the blocks of the grid in use; points have one each, and in the flow
+    they take them in turn; groups are of places of contact, and lanes share those that are
+    joined."""
     takes: tuple[str, ...]
     """Its arguments, by the names under which the simulation knows them."""
     does: str

@@ -18,7 +18,7 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
     step = [
         Launch("clear", "workers", ("grid", "parameters"), "empties the blocks that were in use"),
         Launch("forget", "one", ("grid",), "empties their list"),
-        Launch("scatter", "points", points, "mass, momentum and internal force of the points to the nodes"),
+        Launch("scatter", "flow", points, "mass, momentum and internal force of the points to the nodes"),
         Launch("move", "workers", grid, "velocities of the nodes at the end of the step, drag included"),
     ]
     seen = ("contact", "bodies", *grid)
@@ -28,16 +28,16 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
         step.append(Launch("join", "lanes", seen, "contact at all others, and bodies that slide"))
     if effects.two_phase:
         step.append(Launch("seep", "workers", grid, "rate at which gravity works on liquid that seeps"))
-    step.append(Launch("gather", "points", ("points", *grid), "velocities, their gradients and strains from the nodes"))
+    step.append(Launch("gather", "flow", ("points", *grid), "velocities, their gradients and strains from the nodes"))
     if effects.smoothing_grid:
         step.append(Launch("average", "workers", ("grid", "parameters"), "means at the corners"))
     takes = ("points", "parameters", "book")
-    step.append(Launch("advect", "points", points, "moves the points"))
+    step.append(Launch("advect", "flow", points, "moves the points"))
     if effects.arriving:
         arriving = ("points", "grid", "parameters", "arrival", "book")
         step += [
             Launch("convey", "one", ("arrival", "book"), "how far what arrives has come"),
-            Launch("hold", "points", arriving, "points on their last cells before the section of an inflow"),
+            Launch("hold", "flow", arriving, "points on their last cells before the section of an inflow"),
         ]
     step += [
         Launch("update", "points", ("points", "parameters", "clock"), "strain, effective stress and pore pressure"),
@@ -46,7 +46,7 @@ def launches(effects: Effects) -> tuple[Launch, ...]:
             if all(law.vectorised for law in effects.laws)
             else (Launch("yielding", "points", takes, "what the law allows"),)
         ),
-        Launch("bound", "points", takes, "limits that few points come to"),
+        Launch("bound", "flow", takes, "limits that few points come to"),
         Launch(
             "tick",
             "one",

@@ -124,8 +124,8 @@ def grid_arrays(
 def clock_arrays(
     scenario: Scenario, effects: Effects, initial: MaterialPoints, *, surfaces: int, device: Any
 ) -> dict[str, Any]:
-    """Clock, counters, balance, limiters, impulses on the surfaces and sums, by their names; entries as in
-    `kernels.layout`."""
+    """Clock, counters, balance, limiters, impulses on the surfaces, sums and what is in the flow, by their names;
+    entries as in `kernels.layout`."""
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.SMALLEST_TIME_STEP] = math.inf
     clock[at.SPEED_MAX] = scenario.flow.greatest_speed**2
@@ -144,5 +144,6 @@ def clock_arrays(
         "limiters": wp.zeros(at.LIMITERS_SIZE, dtype=wp.float64, device=device),
         "reactions": wp.zeros(effects.dimensions * surfaces, dtype=wp.float64, device=device),
         "left": wp.zeros(at.LEFT_SIZE + effects.dimensions - 2, dtype=wp.float64, device=device),
+        "flow": wp.zeros(at.FLOW_SIZE * len(initial.spans), dtype=wp.int32, device=device),
         "sums": wp.zeros(at.LEDGER_SIZE, dtype=wp.float64, device=device),
     }

@@ -81,7 +81,7 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
     return fields
 
 
-def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, R: Any) -> dict[str, Any]:
+def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: Any) -> dict[str, Any]:
     """Fields of the structure `Contact`: C places of contact of all bodies, first those that stand alone."""
     array = wp.array
     fields: dict[str, Any] = {
@@ -93,6 +93,9 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, R: Any) -> di
         "first": array(dtype=wp.int32),  # lowest of the 3 x 3 (x 3) nodes, counted through; -1: outside the grid
         "weight_x": array(dtype=V3),
         "weight_y": array(dtype=V3),
+        # Of all its nodes, and the same over their masses, 0 without mass: in the step, over those that have mass.
+        "weight": array(dtype=W),
+        "per_mass": array(dtype=W),
         "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
         "solid": array(dtype=scalar),  # impulses of the step [N s/m]: on the solid along the normal,
         "slot": array(dtype=wp.int32),  # of the barrier (`loads.Slots`); -1: of another body

@@ -49,6 +49,7 @@ class Aflip(Flip):
         F, V2, V3, V, X = types.scalar, types.V2, types.V3, types.V, types.X
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
+        nine, part = tools.nine, tools.part
         TWO_PHASE = types.effects.two_phase
         SPATIAL = types.dimensions == 3
         kept, gained = make_kept(types, tools)
@@ -93,15 +94,9 @@ class Aflip(Flip):
         @wp.func
         def gained_around(grid: Grid, first: wp.int32, wx: V3, wy: V3, parameters: Parameters):
             """Of the gain at the nine nodes of a layer: mean, and first moments about the middle node."""
-            # Along each of the three columns of nodes first, then across.
-            second = first + parameters.rows
-            third = second + parameters.rows
-            field = grid.increment
-            low, left_lean = line(wy, read(field, first), read(field, first + 1), read(field, first + 2))
-            middle, centre_lean = line(wy, read(field, second), read(field, second + 1), read(field, second + 2))
-            high, right_lean = line(wy, read(field, third), read(field, third + 1), read(field, third + 2))
-            increment, gain_x = line(wx, low, middle, high)
-            return increment, gain_x, wx[0] * left_lean + wx[1] * centre_lean + wx[2] * right_lean
+            zero = F(0.0)
+            all = nine(grid.increment, first, parameters.rows, zero, zero, wx[0], wx[1], wx[2], wy[0], wy[1], wy[2])
+            return part(all, 0), part(all, 1), part(all, 2)
 
         @wp.func
         def collect(

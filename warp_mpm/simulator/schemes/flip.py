@@ -116,7 +116,8 @@ class Flip(Scheme):
 
         @wp.func
         def receive(grid: Grid, i: wp.int32, j: wp.int32, change: V):
-            grid.increment[i, j] += change
+            node = i * grid.increment.shape[1] + j
+            write(grid.increment, node, read(grid.increment, node) + change)
 
         @wp.func
         def collect(
