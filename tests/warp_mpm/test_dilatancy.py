@@ -195,8 +195,9 @@ def test_sheared_at_its_volume_a_loose_soil_loses_its_pressure_and_a_dense_one_g
 @pytest.mark.parametrize("viscosity", [0.1, 20.0])
 def test_friction_that_grows_with_the_rate_dilates_too(load_scene, element, fraction, viscosity):
     """dp/dt = K tan ψ γ̇_p, dτ/dt = G (γ̇ - γ̇_p), where γ̇_p is such that τ = p (μ(γ̇_p, p) + tan ψ)."""
-    soil = element(scene(load_scene, law="mu_i", liquid_viscosity_Pa_s=viscosity))
+    soil = element(scene(load_scene, law="mu_i", fluid_viscosity_Pa_s=viscosity))
     material = soil.material
+    assert dilatancy.fluid_viscosity(material) == viscosity  # μ and m_eq go by one viscous number
     g, k = material.shear_modulus, material.bulk_modulus
 
     def ratio(rate, p):
