@@ -36,6 +36,8 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
             bj = block - bi * parameters.block_rows
             i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
             grid.block[bi, bj] = 0
+            if TOLD:
+                telling = grid.telling[bi, bj]
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 grid.mass[i, j] = F(0.0)
@@ -48,7 +50,8 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 if BEYOND:
                     grid.drag_beyond[i, j] = F(0.0)
                 if TOLD:
-                    grid.told[i, j] = M()
+                    if telling == 1:
+                        grid.told[i, j] = M()
                 if CORNERS:
                     grid.corner[i, j] = S()
                 if PARTLY_DRY:
