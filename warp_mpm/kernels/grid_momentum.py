@@ -78,13 +78,25 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
             bi = block / parameters.block_rows
             bj = block - bi * parameters.block_rows
             i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            if MATERIALS:
+                telling = grid.telling[bi, bj]
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
                     if MATERIALS:
-                        told = grid.told[i, j] / mass
-                        ratio = ratio_of_liquid(told, parameters)
+                        ratio = parameters.liquid_ratio
+                        rate = parameters.drag_rate
+                        rate_beyond = F(0.0)
+                        if INERTIAL_DRAG:
+                            rate_beyond = parameters.inertial_drag_rate
+                        if telling == 1:
+                            told = grid.told[i, j] / mass
+                            ratio = ratio_of_liquid(told, parameters)
+                            both = wp.where(ratio > F(0.0), F(1.0) + F(1.0) / ratio, F(0.0))
+                            rate = drag_per_mass(told, parameters) * both
+                            if INERTIAL_DRAG:
+                                rate_beyond = drag_beyond_per_mass(told, parameters) * both
                         inverse = per_masses(mass, ratio)
                     else:
                         inverse = per_mass(mass, parameters)
@@ -97,11 +109,7 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if MATERIALS:
                         if ratio > F(0.0):
-                            both = F(1.0) + F(1.0) / ratio
-                            beyond = F(0.0)
-                            if INERTIAL_DRAG:
-                                beyond = drag_beyond_per_mass(told, parameters) * both
-                            new = dragged(new, ratio, drag_per_mass(told, parameters) * both, beyond, time_step)
+                            new = dragged(new, ratio, rate, rate_beyond, time_step)
                         else:
                             # What has no mass goes with the solid.
                             old = of_phases(solid_of(old), solid_of(old))

@@ -256,6 +256,7 @@ def layout(effects: Effects) -> SimpleNamespace:
     if told:
         # By how much each is more than it would be, were all of the flow's material: its points need not tell it.
         grid["told"] = array(dtype=types.M, ndim=2)
+        grid["telling"] = array(dtype=wp.int32, ndim=2)  # 1 of the blocks in which somebody ever did
     if effects.porosity_update and "drag" not in told:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
         if effects.inertial_drag and effects.conductivity != "constant":
@@ -336,6 +337,8 @@ def layout(effects: Effects) -> SimpleNamespace:
     if told:
         parameters["excess"] = types.M  # what a point of the material tells the nodes, per mass of its solid
         parameters["tells"] = wp.int32  # 1: it is not nil
+        if effects.two_phase:
+            parameters["solid_share"] = scalar  # mass of the solid over that of the whole
     bodies = body_fields(effects, scalar, V2, V4, P)
     contact = contact_fields(effects, scalar, X, V3, W, R) if effects.bodies else {}
 

@@ -36,6 +36,10 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
             bj = block - bi * parameters.block_rows
             i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
             grid.block[bi, bj] = 0
+            if TOLD:
+                if grid.telling[bi, bj] == 1:
+                    for b in range(wp.static(BLOCK)):
+                        grid.told[i, bj * wp.static(BLOCK) + b] = M()
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 grid.mass[i, j] = F(0.0)
@@ -47,8 +51,6 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     grid.drag[i, j] = F(0.0)
                 if BEYOND:
                     grid.drag_beyond[i, j] = F(0.0)
-                if TOLD:
-                    grid.told[i, j] = M()
                 if CORNERS:
                     grid.corner[i, j] = S()
                 if PARTLY_DRY:

@@ -29,15 +29,17 @@ def make_seepage(types: SimpleNamespace, vectors: SimpleNamespace, module: str) 
             bi = block / parameters.block_rows
             bj = block - bi * parameters.block_rows
             i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
+            if MATERIALS:
+                telling = grid.telling[bi, bj]
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 mass = grid.mass[i, j]
                 if mass > F(0.0):
                     v = grid.velocity[i, j]
+                    liquid = mass * parameters.liquid_ratio
                     if MATERIALS:
-                        liquid = mass * ratio_of_liquid(grid.told[i, j] / mass, parameters)
-                    else:
-                        liquid = mass * parameters.liquid_ratio
+                        if telling == 1:
+                            liquid = mass * ratio_of_liquid(grid.told[i, j] / mass, parameters)
                     slip += wide(liquid * (liquid_of(v) - solid_of(v)))
         wp.atomic_add(book.balance, wp.static(SEEPAGE_POWER), wp.dot(wide(parameters.gravity), slip))
 

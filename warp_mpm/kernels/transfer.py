@@ -114,6 +114,18 @@ def make_transfer(
         mark(grid, right + high, parameters)
 
     @wp.func
+    def note_around(grid: Grid, ci: wp.int32, cj: wp.int32, first_block: wp.int32, parameters: Parameters):
+        """Note that somebody tells the nodes of the same blocks something."""
+        left = first_block + ((ci - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = first_block + ((ci + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        low = (cj - 1) >> wp.static(BLOCK_SHIFT)
+        high = (cj + 1) >> wp.static(BLOCK_SHIFT)
+        write(grid.telling, left + low, 1)
+        write(grid.telling, right + low, 1)
+        write(grid.telling, left + high, 1)
+        write(grid.telling, right + high, 1)
+
+    @wp.func
     def spread(p: wp.int32, points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
         """Mass, momentum and internal force of the points to the nodes, the latter two of each phase.
 
@@ -228,9 +240,6 @@ def make_transfer(
                 for m in range(3):
                     node = layer + k * parameters.rows + m
                     add(grid.mass, node, wy[m] * column_mass)
-                    if TOLD:
-                        if tells == 1:
-                            add(grid.told, node, (wy[m] * column_mass) * telling)
                     if DRAG:
                         # The coefficient n^2 rho_L g / k goes with n^2, and with the conductivity where that changes.
                         ratio = n / parameters.porosity
@@ -245,6 +254,22 @@ def make_transfer(
                     deposit(
                         grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope
                     )
+
+        if TOLD:
+            if tells == 1:
+                for q in range(wp.static(LAYERS)):
+                    if SPATIAL:
+                        note_around(grid, ci, cj, (cl - 1 + q) * blocks, parameters)
+                    else:
+                        note_around(grid, ci, cj, 0, parameters)
+                    for k in range(3):
+                        for m in range(3):
+                            node = first + k * parameters.rows + m
+                            share = wx[k] * wy[m] * mass
+                            if SPATIAL:
+                                node += q * parameters.layer
+                                share *= wz[q]
+                            add(grid.told, node, share * telling)
 
         if ALONE_OF_MIXTURE:
             rubbed = wp.bool(False)

@@ -110,7 +110,7 @@ def grid_arrays(
     """Nodes, corners of the smoothing grid, and the list of blocks in use."""
     blocks = (grid.layers * grid.columns // at.BLOCK, grid.rows // at.BLOCK)
     shapes: dict[str, Any] = dict.fromkeys(types.grid_fields, (grid.layers * grid.columns, grid.rows))
-    shapes |= {"block": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 2}
+    shapes |= {"block": blocks, "telling": blocks, "active": blocks[0] * blocks[1], "active_count": 1, "shift": 2}
     given: dict[str, Any] = {}
     if effects.bodies and not effects.passing:
         given["solid"] = solid_cells(bodies, grid)

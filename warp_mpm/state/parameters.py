@@ -70,6 +70,8 @@ def tell_nodes(of_materials: Sequence[Any], types: SimpleNamespace) -> None:
             for name in types.told
         ]
         own.excess, own.tells = types.M(*excess), int(any(excess))
+        if types.effects.two_phase:
+            own.solid_share = 1.0 / (1.0 + float(own.liquid_ratio))
 
 
 def _grid_and_clock(

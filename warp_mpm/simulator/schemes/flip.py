@@ -43,8 +43,7 @@ def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]
                 # The sum over the points of what the grid does not see is nil for each phase. Where the shares of the
                 # phases differ between points, each must therefore keep its own momentum.
                 lost = (F(1.0) - decay) * (liquid_of(unseen) - solid_of(unseen))
-                of_solid = F(1.0) / (F(1.0) + parameters.liquid_ratio)
-                new += of_phases((F(1.0) - of_solid) * lost, -of_solid * lost)
+                new += of_phases((F(1.0) - parameters.solid_share) * lost, -parameters.solid_share * lost)
             else:
                 solid = solid_of(new)
                 liquid = solid + liquid_of(smooth) - solid_of(smooth) + decay * (liquid_of(unseen) - solid_of(unseen))
