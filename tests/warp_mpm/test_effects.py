@@ -3,6 +3,7 @@ scene; and an effect without influence is the same as none."""
 
 import re
 import tempfile
+from functools import cache
 from pathlib import Path
 from unittest.mock import patch
 
@@ -121,7 +122,11 @@ def test_memory_is_at_most_600_bytes_a_point(load_scene):
 def generated_code(scenario):
     """What Warp generates for the scene's kernels, without the comments that repeat the Python source. It goes no
     further: what a compiler makes of it takes ten seconds for each set of effects, and nobody looks at that here."""
-    effects = derive_effects(scenario)
+    return _generated_code(derive_effects(scenario))
+
+
+@cache
+def _generated_code(effects):
     build_kernels(effects)
     with tempfile.TemporaryDirectory() as folder, patch("warp._src.build.build_cpu", lambda *given, **options: None):
         wp.compile_aot_module(wp.get_module(effects.module_name), device="cpu", module_dir=folder)
