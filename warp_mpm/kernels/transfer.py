@@ -52,7 +52,8 @@ def make_transfer(
     SPATIAL = types.dimensions == 3
     LAYERS, CORNER_LAYERS = (3, 2) if SPATIAL else (1, 1)
     elementary = make_elementary(types)
-    read, write, add, larger = elementary.read, elementary.write, elementary.add, elementary.larger
+    read, write, add = elementary.read, elementary.write, elementary.add
+    larger, smaller = elementary.larger, elementary.smaller
 
     nodes = make_around(types)
     nine, part = nodes.nine, nodes.part
@@ -431,16 +432,16 @@ def make_transfer(
                 bj = block - bi * parameters.block_rows
                 i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
                 for b in range(wp.static(BLOCK)):
-                    j = bj * wp.static(BLOCK) + b
-                    corner = grid.corner[i, j]
+                    place = i * parameters.rows + bj * wp.static(BLOCK) + b
+                    corner = read(grid.corner, place)
                     if corner[0] > F(0.0):
-                        mean = corner / corner[0]
-                        filling = corner[0] * grid.corner_room[i, j]
+                        mean = (F(1.0) / corner[0]) * corner
+                        filling = corner[0] * read(grid.corner_room, place)
                         if DENSITY:
                             # Up to one as everywhere; beyond one, crowding, which needs the room behind inclined faces.
-                            filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
+                            filling = larger(smaller(filling, F(1.0)), corner[0] * read(grid.corner_space, place))
                         mean[0] = filling
-                        grid.corner[i, j] = mean
+                        write(grid.corner, place, mean)
 
         kernels.average = average
 
