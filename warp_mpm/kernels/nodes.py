@@ -14,7 +14,8 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
     effects = types.effects
     F, V, X, S = types.scalar, types.V, types.X, types.S
     Grid, Parameters = types.Grid, types.Parameters
-    larger = make_elementary(types).larger
+    elementary = make_elementary(types)
+    read, write, larger, smaller = elementary.read, elementary.write, elementary.larger, elementary.smaller
     empty = types.scheme.clear
     CORNERS = effects.smoothing_grid
     DENSITY = effects.density_correction
@@ -75,23 +76,23 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 bj = block - bi * parameters.block_rows
                 i = bi * wp.static(BLOCK) + s % wp.static(BLOCK)
                 for b in range(wp.static(BLOCK)):
-                    j = bj * wp.static(BLOCK) + b
-                    corner = grid.corner[i, j]
+                    place = i * parameters.rows + bj * wp.static(BLOCK) + b
+                    corner = read(grid.corner, place)
                     if corner[0] > F(0.0):
-                        mean = corner / corner[0]
-                        filling = corner[0] * grid.corner_room[i, j]
+                        mean = (F(1.0) / corner[0]) * corner
+                        filling = corner[0] * read(grid.corner_room, place)
                         if DENSITY:
                             # Up to one as everywhere; beyond one, crowding, which needs the room behind inclined faces.
-                            filling = wp.max(wp.min(filling, F(1.0)), corner[0] * grid.corner_space[i, j])
+                            filling = larger(smaller(filling, F(1.0)), corner[0] * read(grid.corner_space, place))
                         mean[0] = filling
                         if PARTLY_DRY:
                             # Means of the liquid over the points that have any.
-                            wet = larger(corner[0] - grid.corner_wet[i, j], F(0.0))
+                            wet = larger(corner[0] - read(grid.corner_wet, place), F(0.0))
                             if wet > F(wp.static(NEXT_TO_NIL)) * corner[0]:
                                 for k in range(2, wp.static(S._length_)):
                                     mean[k] = corner[k] / wet
-                            grid.corner_wet[i, j] = wet * grid.corner_room[i, j]
-                        grid.corner[i, j] = mean
+                            write(grid.corner_wet, place, wet * read(grid.corner_room, place))
+                        write(grid.corner, place, mean)
 
         kernels.average = average
 
