@@ -9,7 +9,7 @@ import pytest
 from warp_mpm.caveats import scene_caveats
 from warp_mpm.discretization import SMALLEST_POINT, arriving_points, material_points
 from warp_mpm.extent import domain_extent
-from warp_mpm.kernels.layout import HELD
+from warp_mpm.kernels.layout import HELD, INSIDE, OUTSIDE, WAITING
 from warp_mpm.recording import Schedule
 from warp_mpm.run import run_in_memory
 from warp_mpm.scenario import Inflow, Scenario
@@ -314,6 +314,16 @@ def test_what_waits_is_not_gone_over():
     assert not simulation._point_arrays["pressure_residual"].numpy()[held].any()
     simulation.advance(1.0)
     assert 0.4 * simulation.material_points < simulation._counts["points"] < 0.8 * simulation.material_points
+    # Kernels over the flow end where what waits begins; the one that looks for what arrives begins behind what had
+    # when it was last told.
+    simulation.advance(1.001)
+    end, arriving, step = (int(entry) for entry in simulation._read("flow"))
+    state = simulation._point_arrays["inside"].numpy()
+    assert (state[end:] == WAITING).all()
+    assert ((state[:arriving] == INSIDE) | (state[:arriving] == OUTSIDE)).all()
+    assert arriving > 0.1 * simulation.material_points
+    assert end - arriving < 0.3 * simulation.material_points
+    assert step == simulation._counts["flow"] == 1  # on a processor one thread takes all of them
 
 
 def test_a_run_is_the_same_however_it_is_cut_and_taken_up():
