@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mpm.hard_cases.bounds import impact_speed, pressure_bound, speed_bound
 from warp_mpm.hard_cases.criteria import CRITERIA, Criterion
 from warp_mpm.recording import Recorder, Schedule, SeriesInMemory, Watcher, record_until
-from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, UndrainedMaterial
+from warp_mpm.scenario import STANDARD_GRAVITY, Scenario, Skeleton, UndrainedMaterial
 from warp_mpm.simulation import Simulation, SimulationDiverged
 from warp_mpm.simulator.bodies.of_scene import BARRIER, barrier_bodies, ground_body
 from warp_mpm.simulator.laws import LAWS
@@ -77,9 +77,11 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
         "porosity_low": -1.0
     }
     measured = Measured({"diverged": 0.0})
-    material, begin = scenario.flow.material, snapshot_of(simulation)
-    law = LAWS.named(material.law)
-    undecided_energy = law.undecided_energy(material, begin["volume"], begin["effective_stress"])
+    begin = snapshot_of(simulation)
+    undecided_energy = sum(
+        LAWS.named(material.law).undecided_energy(material, begin["volume"][own], begin["effective_stress"][own])
+        for material, own in _by_material(scenario, begin)
+    )
 
     def look(simulation: Any) -> None:
         snapshot = snapshot_of(simulation)
@@ -114,7 +116,7 @@ def _run(scenario: Scenario, make_simulation: Callable[[Scenario], Any]) -> Meas
             "wall_time": time.perf_counter() - started,
         }
     )
-    strength = law.strength(material)
+    strength = max(LAWS.named(material.law).strength(material) for material in scenario.flow.materials)
     if math.isfinite(strength):
         # A skeleton is stopped in free fall, between two samples of the speed.
         fastest = max(measured.figures["speed_max"], impact_speed(scenario))
@@ -172,15 +174,20 @@ def _of_the_series(scenario: Scenario, columns: dict[str, Array], undecided_ener
 
 def _widen(extremes: dict[str, float], scenario: Scenario, snapshot: Snapshot) -> None:
     # Of the volumes: the porosity that a scene holds constant would tell nothing.
-    porosity = 1.0 - snapshot["solid_mass"] / (scenario.flow.material.grain_density_kg_per_m3 * snapshot["volume"])
+    grains = np.zeros(len(snapshot.position))
+    for material, own in _by_material(scenario, snapshot):
+        grains[own] = snapshot["solid_mass"][own] / material.grain_density_kg_per_m3
+    porosity = 1.0 - grains / snapshot["volume"]
     found = {
         "penetration": _penetration(scenario, snapshot),
         "porosity_low": -float(porosity.min()),
         "porosity_high": float(porosity.max()),
     }
-    excess, found["stress_max"] = _yield_excess(scenario, snapshot["effective_stress"])
-    if excess is not None:
-        found["yield_excess"] = excess
+    for material, own in _by_material(scenario, snapshot):
+        excess, greatest = _yield_excess(material, snapshot["effective_stress"][own])
+        found["stress_max"] = np.maximum(found.get("stress_max", 0.0), greatest)
+        if excess is not None:
+            found["yield_excess"] = np.maximum(found.get("yield_excess", 0.0), excess)
     for name, value in found.items():
         extremes[name] = float(np.maximum(extremes[name], value))  # which keeps NaN
 
@@ -205,9 +212,18 @@ def _penetration(scenario: Scenario, snapshot: Snapshot) -> float:
     return float(depth.max() / scenario.numerics.spacing_m)
 
 
-def _yield_excess(scenario: Scenario, stress: Array) -> tuple[float | None, float]:
+def _by_material(scenario: Scenario, snapshot: Snapshot) -> Iterator[tuple[Skeleton, NDArray[np.bool_]]]:
+    """Each material of the scene of which there are points, and which these are [N]."""
+    materials = scenario.flow.materials
+    place = snapshot["material"] if len(materials) > 1 else np.zeros(len(snapshot.position))
+    for number, material in enumerate(materials):
+        own = place == number
+        if own.any():
+            yield material, own
+
+
+def _yield_excess(material: Skeleton, stress: Array) -> tuple[float | None, float]:
     """Greatest distance outside of what the law allows, None where it allows all, and greatest stress [Pa]."""
-    material = scenario.flow.material
     law = LAWS.named(material.law)
     xx, yy, zz, xy = stress.T
     mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
