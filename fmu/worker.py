@@ -45,8 +45,11 @@ class Worker:
         """x of the crest's downstream end before the barrier moves [m]; None without a crest."""
 
     def open(self, *, scenario: str, device: str, spacing: float | None, driven: bool) -> dict[str, Any]:
-        from warp_mpm import Scenario, Simulation
-        from warp_mpm.scenario.barrier import Trapezoid
+        from warp_mpm.loading import no_garbage
+
+        with no_garbage():
+            from warp_mpm import Scenario, Simulation
+            from warp_mpm.scenario.barrier import Trapezoid
 
         self.scenario = Scenario.load(Path(scenario))
         changes: dict[str, Any] = {}

@@ -147,11 +147,14 @@ def run(
         scenario = _scenario(scenario_file, spacing, until)
         folder = out if out is not None else Path("runs") / scenario_file.stem
 
-    from analytic.whole_file import UnwrittenError
-    from warp_mpm.recording.run_folder import CHECKPOINT, RunFolder, RunFolderError
-    from warp_mpm.results import ResultsError
-    from warp_mpm.run import resume_run, run_scenario
-    from warp_mpm.terminal import RunDisplay, StopOnSignal
+    from warp_mpm.loading import no_garbage
+
+    with no_garbage():
+        from analytic.whole_file import UnwrittenError
+        from warp_mpm.recording.run_folder import CHECKPOINT, RunFolder, RunFolderError
+        from warp_mpm.results import ResultsError
+        from warp_mpm.run import resume_run, run_scenario
+        from warp_mpm.terminal import RunDisplay, StopOnSignal
 
     try:
         if resume is None:

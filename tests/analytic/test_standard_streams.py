@@ -38,7 +38,9 @@ def test_what_an_encoding_lacks_is_spelled(encoding):
     assert "?" not in text
 
 
-@pytest.mark.parametrize("redirection", ["2>&-", ">&-", ">&- 2>&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize(
+    "redirection", ["2>&-", ">&-", pytest.param(">&- 2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-"]
+)
 def test_closed_streams_stop_nothing(redirection, tmp_path):
     figure = tmp_path / "figure.png"
     answer = predict(f"--plot {figure} {redirection}")

@@ -62,6 +62,7 @@ ALONE = (
 run with `slow`; `at-rest`, `rough-slope`, `free-settling` and those of `LONG` stand for their kind."""
 
 LONG = {
+    "collision": "tests/warp_mpm/test_contact.py: reactions are the momentum change; test_sliding_barrier.py",
     "hydrostatic": "at-rest: the same column of the two-phase law, against a face",
     "terzaghi": "free-settling: the same two fields of equations, and drag, to a steady state",
     "jet": "bore: a flow turned by a wall, its force against theory",

@@ -76,6 +76,7 @@ def test_anchor_holds_as_much_as_in_the_monolithic_run(folder: Path) -> None:
     assert rows[-1].barrier_displacement < 0.95 * monolithic(2.0)
 
 
+@pytest.mark.slow  # by default the two above hold the error of the step that the documentation takes
 def test_coupling_error_falls_with_the_step(folder: Path) -> None:
     """First order in the step, for a barrier so light that the coupling is what rules."""
     scenario = Scenario.load(ROOT / "scenarios" / "set_iib.json").replaced(

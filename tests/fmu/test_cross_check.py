@@ -49,8 +49,8 @@ FIXED = {
 
 
 def with_the_others_slow(table: dict[str, object]) -> list[object]:
-    """Two of the sets by default, from the middle of the bands and from their edge; all of them when slow."""
-    return [pytest.param(name, marks=[pytest.mark.slow] * (name not in ("set_iib", "set_v"))) for name in table]
+    """One of the sets by default, from the middle of the bands; all of them when slow."""
+    return [pytest.param(name, marks=[pytest.mark.slow] * (name != "set_iib")) for name in table]
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """A whole run with a stand-in for the simulation: what lands in the folder, whatever happens."""
 
+import gc
 import json
 
 import numpy as np
@@ -8,6 +9,7 @@ from typer.testing import CliRunner
 
 from warp_mpm import plotting
 from warp_mpm.cli import app
+from warp_mpm.loading import no_garbage
 from warp_mpm.recording import run_folder
 from warp_mpm.recording.run_folder import RunFolder, RunFolderError
 from warp_mpm.report import write_report
@@ -214,3 +216,16 @@ def test_pictures_are_drawn_where_asked_for(coarse_case_1, tmp_path, flying_poin
     run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points, pictures=False)
     pictures = {run_folder.FORCE_PLOT, run_folder.PRESSURE_PLOT}
     assert {item.name for item in (tmp_path / "run").iterdir()} == {*run_folder.OWN_FILES} - pictures
+
+
+def test_garbage_is_looked_for_again_once_all_is_loaded():
+    def fail():
+        with no_garbage():
+            with no_garbage():
+                assert not gc.isenabled()
+            assert not gc.isenabled()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert gc.isenabled()

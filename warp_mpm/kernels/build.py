@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from ..effects import Effects
+from ..loading import no_garbage
 from ..simulator.bodies.kernels import make_body_functions
 from ..simulator.laws.law import all_functions as law_functions
 from ..simulator.schemes.scheme import all_functions as scheme_functions
@@ -42,6 +43,7 @@ CHECKED = os.environ.get("WARP_MPM_CHECKED", "") not in ("", "0")
 
 
 @cache
+@no_garbage()
 def build_kernels(effects: Effects) -> SimpleNamespace:
     """Kernels for `effects`, and no others, in a Warp module of their own.
 

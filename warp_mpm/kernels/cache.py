@@ -15,6 +15,8 @@ import warp as wp
 
 from analytic.whole_file import UnwrittenError
 
+from ..loading import no_garbage
+
 try:
     import fcntl
 except ImportError:  # Windows
@@ -46,6 +48,7 @@ def initialize_warp() -> None:
         wp.init()
 
 
+@no_garbage()
 def load_kernels(module_name: str, device: Any) -> None:
     """Compile the kernels of a module, or find them compiled.
 
