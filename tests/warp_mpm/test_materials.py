@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warp_mpm.description import described
 from warp_mpm.discretization import material_points
-from warp_mpm.effect_rules import derive_effects, with_law, without_liquid
+from warp_mpm.effect_rules import derive_effects, effect_rules, with_law, without_liquid
 from warp_mpm.fields import field_values, solid_density_of
+from warp_mpm.performance.plan import described as effect_value
 from warp_mpm.scenario import Scenario
+from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
 from warp_mpm.snapshot import snapshot_of
 from warp_mpm.time_step import step_limits
@@ -105,6 +108,20 @@ def test_effects_are_those_of_what_differs():
     # Without liquid nodes have nothing to tell apart.
     both = layers({"material": {"grain_density_kg_per_m3": 3000.0}}, formulation="dry")
     assert derive_effects(both) == derive_effects(layers({}, formulation="dry"))
+
+
+def test_a_deposit_of_its_own_material_is_told_and_checked_as_the_flow():
+    scene = layers({"formulation": "dry", "material": {"porosity": 0.4} | MU_I})
+    assert "deposit 0 dry, mu_i, 1,560 kg/m³" in "".join(described(scene))
+    inertial = {"material": {"inertial_drag_coefficient": 0.4}}
+    with pytest.raises(ScenarioError, match=r"flow.deposits\[0\].material.inertial_drag_coefficient = 0.4 is not"):
+        layers(inertial, **{"numerics.drag": "explicit"})
+    kinds = {rule.effect: rule for rule in effect_rules(scene)}["kinds"]
+    assert kinds.on
+    assert effect_value(kinds.value) == "mohr-coulomb-wet, mu-i-dry"
+    none = {rule.effect: rule for rule in effect_rules(layers({}))}["kinds"]
+    assert not none.on
+    assert effect_value(none.value) == "off"
 
 
 def ledger(simulation, mass):
