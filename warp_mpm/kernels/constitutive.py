@@ -238,9 +238,13 @@ def make_constitutive(
 
     @wp.kernel(module=module)
     def advect(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
-        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+        p = wp.int32(wp.tid())
+        end = book.flow[wp.static(FLOW_END)]
+        step = book.flow[wp.static(FLOW_STEP)]
+        while p < end:
             if read(points.inside, p) == wp.static(INSIDE):
                 carry(p, points, grid, parameters, bodies, book)
+            p += step
 
     @wp.func
     def settle(
@@ -363,9 +367,13 @@ def make_constitutive(
 
     @wp.kernel(module=module)
     def bound(points: Points, parameters: Parameters, book: Book):
-        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+        p = wp.int32(wp.tid())
+        end = book.flow[wp.static(FLOW_END)]
+        step = book.flow[wp.static(FLOW_STEP)]
+        while p < end:
             if read(points.inside, p) > 0:
                 limit(p, points, parameters, book)
+            p += step
 
     kernels = SimpleNamespace(advect=advect, update=update, bound=bound)
     if effects.arriving:

@@ -313,9 +313,13 @@ def make_transfer(
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):
-        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+        p = wp.int32(wp.tid())
+        end = book.flow[wp.static(FLOW_END)]
+        step = book.flow[wp.static(FLOW_STEP)]
+        while p < end:
             if read(points.inside, p) > 0:
                 spread(p, points, grid, parameters, bodies, book)
+            p += step
 
     @wp.func
     def mean(w: V3, low: V, middle: V, high: V) -> V:
@@ -437,8 +441,12 @@ def make_transfer(
 
     @wp.kernel(module=module)
     def gather(points: Points, grid: Grid, parameters: Parameters, book: Book):
-        for p in range(wp.tid(), book.flow[wp.static(FLOW_END)], book.flow[wp.static(FLOW_STEP)]):
+        p = wp.int32(wp.tid())
+        end = book.flow[wp.static(FLOW_END)]
+        step = book.flow[wp.static(FLOW_STEP)]
+        while p < end:
             if read(points.inside, p) > 0:
                 take(p, points, grid, parameters, book)
+            p += step
 
     return SimpleNamespace(scatter=scatter, gather=gather)
