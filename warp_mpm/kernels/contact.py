@@ -42,7 +42,7 @@ NODES = {2: 9, 3: 27}
 """Around a place, by the number of dimensions, counted column by column. A loop of more than three rounds is not
 written out: contact is half of what there is to compile, and a small share of a step."""
 
-WEIGHTLESS = 1e-30
+WEIGHTLESS = 1e-15
 """Of a ratio of masses, in place of nil."""
 
 REACHED = 0.75
@@ -86,6 +86,7 @@ def make_contact(
     MATERIALS = "told" in types.grid_fields
     told_of = make_told(types)
     ratio_of_liquid, ratio_of_filling = told_of.ratio_of_liquid, told_of.ratio_of_filling
+    LIQUID_WEIGHTS = MATERIALS and TWO_PHASE
     told_drag = told_of.drag_per_mass
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
@@ -109,8 +110,10 @@ def make_contact(
         total = F(0.0)
         if MATERIALS:
             of_liquid = F(0.0)
+            of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
+            filling_twice = F(0.0)
         for k in range(AROUND):
             w, node = around(contact, e, wx, wy, k, parameters)
             if w > F(0.0):
@@ -121,20 +124,34 @@ def make_contact(
                     if MATERIALS:
                         told = read(grid.told, node) / mass
                         if TWO_PHASE:
-                            of_liquid += w * ratio_of_liquid(told, parameters)
+                            ratio = ratio_of_liquid(told, parameters)
+                            of_liquid += w * ratio
+                            of_liquid_twice += w * w / mass * ratio
                             drag += w * told_drag(told, parameters)
                         if CARRIED:
-                            filling += w * ratio_of_filling(told, parameters)
+                            filled = ratio_of_filling(told, parameters)
+                            filling += w * filled
+                            filling_twice += w * w / mass * filled
         if MATERIALS:
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
+            # Of the liquid's own weights, w times its mass over that of the solid: a node that holds next to none of it
+            # has any velocity.
+            again = F(1.0)
+            if contact.fixed[e] == 0:
+                again = inverse_total * inverse_total
             if TWO_PHASE:
                 contact.liquid_ratio[e] = larger(of_liquid * inverse_total, F(wp.static(WEIGHTLESS)))
+                contact.liquid_inverse[e] = (
+                    again * of_liquid_twice / (contact.liquid_ratio[e] * contact.liquid_ratio[e])
+                )
                 if FRICTION:
                     contact.drag_per_mass[e] = drag * inverse_total
             if CARRIED:
                 contact.filling_ratio[e] = larger(filling * inverse_total, F(wp.static(WEIGHTLESS)))
+                squared = contact.filling_ratio[e] * contact.filling_ratio[e]
+                contact.filling_inverse[e] = again * filling_twice / squared
         if total < F(wp.static(REACHED)):
             result = F(0.0)
         elif contact.fixed[e] == 0:
@@ -150,7 +167,14 @@ def make_contact(
         result = V()
         for k in range(AROUND):
             w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.velocity, node)
+            if LIQUID_WEIGHTS:
+                mass = read(grid.mass, node)
+                if mass > F(0.0):
+                    v = read(grid.velocity, node)
+                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                    result += w * of_phases(solid_of(v), of_liquid * liquid_of(v))
+            else:
+                result += w * read(grid.velocity, node)
         return result
 
     @wp.func
@@ -161,7 +185,13 @@ def make_contact(
         result = X()
         for k in range(AROUND):
             w, node = around(contact, e, wx, wy, k, parameters)
-            result += w * read(grid.liquid_alone, node)
+            if MATERIALS:
+                mass = read(grid.mass, node)
+                if mass > F(0.0):
+                    filled = ratio_of_filling(read(grid.told, node) / mass, parameters) / contact.filling_ratio[e]
+                    result += w * filled * read(grid.liquid_alone, node)
+            else:
+                result += w * read(grid.liquid_alone, node)
         return result
 
     @wp.func
@@ -390,8 +420,12 @@ def make_contact(
             liquid_velocity += (give_way * change) * n
             ratio = liquid_ratio(contact, e, parameters)
             liquid_inverse = inverse / ratio
+            if MATERIALS:
+                liquid_inverse = contact.liquid_inverse[e]
             old_liquid = contact.liquid[e]
-            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
+            new_liquid = F(0.0)
+            if liquid_inverse > F(0.0):
+                new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
             contact.liquid[e] = new_liquid
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
@@ -406,8 +440,12 @@ def make_contact(
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     filling = filling_ratio(contact, e, parameters)
                     alone_inverse = inverse / filling
+                    if MATERIALS:
+                        alone_inverse = contact.filling_inverse[e]
                     old_alone = contact.alone[e]
-                    new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
+                    new_alone = F(0.0)
+                    if alone_inverse > F(0.0):
+                        new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
                     contact.alone[e] = new_alone
                     change_alone = (new_alone - old_alone) / filling
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
