@@ -249,6 +249,11 @@ def make_contact(
         return result
 
     @wp.func
+    def weightless_if_nil(inverse: F) -> F:
+        """What is not there takes no impulse: it gives way to the least."""
+        return wp.where(inverse > F(0.0), inverse, F(1.0e30))
+
+    @wp.func
     def drag_share(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> F:
         """Share of the solid's change of velocity that drag passes on to the liquid within the step."""
         share = F(0.0)
@@ -421,11 +426,9 @@ def make_contact(
             ratio = liquid_ratio(contact, e, parameters)
             liquid_inverse = inverse / ratio
             if MATERIALS:
-                liquid_inverse = contact.liquid_inverse[e]
+                liquid_inverse = weightless_if_nil(contact.liquid_inverse[e])
             old_liquid = contact.liquid[e]
-            new_liquid = F(0.0)
-            if liquid_inverse > F(0.0):
-                new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
+            new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) / (liquid_inverse + give_way), F(0.0))
             contact.liquid[e] = new_liquid
             liquid_change = new_liquid - old_liquid
             push -= liquid_change * n
@@ -441,11 +444,9 @@ def make_contact(
                     filling = filling_ratio(contact, e, parameters)
                     alone_inverse = inverse / filling
                     if MATERIALS:
-                        alone_inverse = contact.filling_inverse[e]
+                        alone_inverse = weightless_if_nil(contact.filling_inverse[e])
                     old_alone = contact.alone[e]
-                    new_alone = F(0.0)
-                    if alone_inverse > F(0.0):
-                        new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
+                    new_alone = wp.max(old_alone - wp.dot(alone, n) / alone_inverse, F(0.0))
                     contact.alone[e] = new_alone
                     change_alone = (new_alone - old_alone) / filling
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (
