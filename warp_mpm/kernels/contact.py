@@ -39,7 +39,7 @@ MOST = 100
 """Sweeps where a body that slides still changes its velocity, as when it starts or stops, or is lighter than a cell of
 the flow."""
 
-WEIGHTLESS = 1e-30
+WEIGHTLESS = 1e-15
 """Of a ratio of masses, in place of nil."""
 
 REACHED = 0.75
@@ -86,6 +86,7 @@ def make_contact(
     MATERIALS = "told" in types.grid_fields
     told_of = make_told(types)
     ratio_of_liquid, ratio_of_filling = told_of.ratio_of_liquid, told_of.ratio_of_filling
+    LIQUID_WEIGHTS = MATERIALS and TWO_PHASE
     told_drag = told_of.drag_per_mass
     RUBS_ALONG = FRICTION and not SPATIAL  # a barrier, in whose slots it is kept, is of the plane
 
@@ -96,6 +97,11 @@ def make_contact(
         if SPATIAL:
             layer = parameters.layer
         return layer
+
+    @wp.func
+    def node_of(first: wp.int32, k: wp.int32, parameters: Parameters) -> wp.int32:
+        """The kth of the nodes around a place, counted through."""
+        return first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
 
     @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
@@ -121,29 +127,45 @@ def make_contact(
         total = sums[1]
         if MATERIALS:
             of_liquid = F(0.0)
+            of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
+            filling_twice = F(0.0)
             per_mass = contact.per_mass[e]
             for k in range(AROUND):
                 if per_mass[k] > F(0.0):
-                    node = first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
+                    node = node_of(first, k, parameters)
                     mass = read(grid.mass, node)
                     w = per_mass[k] * mass
                     told = read(grid.told, node) / mass
                     if TWO_PHASE:
-                        of_liquid += w * ratio_of_liquid(told, parameters)
+                        ratio = ratio_of_liquid(told, parameters)
+                        of_liquid += w * ratio
+                        of_liquid_twice += w * per_mass[k] * ratio
                         drag += w * told_drag(told, parameters)
                     if CARRIED:
-                        filling += w * ratio_of_filling(told, parameters)
+                        filled = ratio_of_filling(told, parameters)
+                        filling += w * filled
+                        filling_twice += w * per_mass[k] * filled
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
+            # Of the liquid's own weights, w times its mass over that of the solid: a node that holds next to none of it
+            # has any velocity.
+            again = F(1.0)
+            if contact.fixed[e] == 0:
+                again = inverse_total * inverse_total
             if TWO_PHASE:
                 contact.liquid_ratio[e] = larger(of_liquid * inverse_total, F(wp.static(WEIGHTLESS)))
+                contact.liquid_inverse[e] = (
+                    again * of_liquid_twice / (contact.liquid_ratio[e] * contact.liquid_ratio[e])
+                )
                 if FRICTION:
                     contact.drag_per_mass[e] = drag * inverse_total
             if CARRIED:
                 contact.filling_ratio[e] = larger(filling * inverse_total, F(wp.static(WEIGHTLESS)))
+                squared = contact.filling_ratio[e] * contact.filling_ratio[e]
+                contact.filling_inverse[e] = again * filling_twice / squared
         if total < F(wp.static(REACHED)):
             result = F(0.0)
         elif read(contact.fixed, e) == 0:
@@ -155,14 +177,37 @@ def make_contact(
     @wp.func
     def seen(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> V:
         """Velocities of the flow at the place."""
-        return seen_at(grid.velocity, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e)
+        first = read(contact.first, e)
+        if LIQUID_WEIGHTS:
+            result = V()
+            weight = contact.weight[e]
+            for k in range(AROUND):
+                node = node_of(first, k, parameters)
+                mass = read(grid.mass, node)
+                if mass > F(0.0):
+                    v = read(grid.velocity, node)
+                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                    result += weight[k] * of_phases(solid_of(v), of_liquid * liquid_of(v))
+        else:
+            result = seen_at(grid.velocity, first, parameters.rows, layer_of(parameters), contact.weight, e)
+        return result
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
         """Velocity of the liquid alone at the place."""
-        return seen_at(
-            grid.liquid_alone, read(contact.first, e), parameters.rows, layer_of(parameters), contact.weight, e
-        )
+        first = read(contact.first, e)
+        if MATERIALS:
+            result = X()
+            weight = contact.weight[e]
+            for k in range(AROUND):
+                node = node_of(first, k, parameters)
+                mass = read(grid.mass, node)
+                if mass > F(0.0):
+                    filled = ratio_of_filling(read(grid.told, node) / mass, parameters) / contact.filling_ratio[e]
+                    result += weight[k] * filled * read(grid.liquid_alone, node)
+        else:
+            result = seen_at(grid.liquid_alone, first, parameters.rows, layer_of(parameters), contact.weight, e)
+        return result
 
     @wp.func
     def give(contact: Contact, e: wp.int32, impulse: V, grid: Grid, parameters: Parameters):
@@ -208,6 +253,11 @@ def make_contact(
         else:
             result = parameters.filling_ratio
         return result
+
+    @wp.func
+    def weightless_if_nil(inverse: F) -> F:
+        """What is not there takes no impulse: it gives way to the least."""
+        return wp.where(inverse > F(0.0), inverse, F(1.0e30))
 
     @wp.func
     def drag_share(contact: Contact, e: wp.int32, parameters: Parameters, time_step: F) -> F:
@@ -385,9 +435,13 @@ def make_contact(
             liquid_velocity = liquid_of(velocity) - surface
             liquid_velocity += (give_way * change) * n
             ratio = liquid_ratio(contact, e, parameters)
-            liquid_mass = ratio * mass
-            if SLIDING:
-                liquid_mass = liquid_mass / (F(1.0) + liquid_mass * give_way)
+            if MATERIALS:
+                liquid_inverse = weightless_if_nil(contact.liquid_inverse[e])
+                liquid_mass = F(1.0) / (liquid_inverse + give_way)
+            else:
+                liquid_mass = ratio * mass
+                if SLIDING:
+                    liquid_mass = liquid_mass / (F(1.0) + liquid_mass * give_way)
             old_liquid = read(contact.liquid, e)
             new_liquid = wp.max(old_liquid - wp.dot(liquid_velocity, n) * liquid_mass, F(0.0))
             write(contact.liquid, e, new_liquid)
@@ -403,8 +457,12 @@ def make_contact(
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     filling = filling_ratio(contact, e, parameters)
+                    if MATERIALS:
+                        alone_mass = F(1.0) / weightless_if_nil(contact.filling_inverse[e])
+                    else:
+                        alone_mass = filling * mass
                     old_alone = read(contact.alone, e)
-                    new_alone = wp.max(old_alone - wp.dot(alone, n) * (filling * mass), F(0.0))
+                    new_alone = wp.max(old_alone - wp.dot(alone, n) * alone_mass, F(0.0))
                     write(contact.alone, e, new_alone)
                     change_alone = (new_alone - old_alone) * (F(1.0) / filling)
                 normal_force = F(0.5) * effective(contact, e) + F(0.25) * (

@@ -132,9 +132,11 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         # Means over the nodes of a place, per mass of the solid, as the parameters of these names.
         if effects.two_phase:
             fields["liquid_ratio"] = array(dtype=scalar)
+            fields["liquid_inverse"] = array(dtype=scalar)  # gain of the liquid's velocity per impulse
             fields["drag_per_mass"] = array(dtype=scalar)
         if effects.liquid_alone:
             fields["filling_ratio"] = array(dtype=scalar)
+            fields["filling_inverse"] = array(dtype=scalar)
     return fields
 
 
