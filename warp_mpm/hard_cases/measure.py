@@ -253,7 +253,7 @@ def _pressure_noise(scenario: Scenario, snapshot: Snapshot) -> list[float]:
     full = count[cell] >= 3
     if not full.any():
         return []
-    material = scenario.flow.material
+    material = scenario.flow.wettest
     assert isinstance(material, UndrainedMaterial)
     # Over the pressure of the liquid at rest, whose gradient is no noise.
     excess = pressure - material.liquid_density_kg_per_m3 * (snapshot.position @ scenario.gravity.vector)

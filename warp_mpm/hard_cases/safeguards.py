@@ -84,6 +84,7 @@ KNOWN_LIMITS = (
     "`elastic_spray` (2.4 %). It is what is left of two large impulses, that of the flow and that of the base, and "
     "shows ten times the error of either. The filtered peak force changes by 4.9 % where one point hits the barrier "
     "(`one_point`), by 2.1 to 2.7 % where a soft dry block does (`dry_soft_45`), with a point to a cell (`points_1`), "
+    "where a dry flow meets a wet heap (`wet_deposit`), "
     "where a block falls onto the ground (`falling_block`), under a dilatancy a hundred times as strong "
     "(`dilatancy_100`) and with FLIP (`flip`), by 5 % where a jet of 30 m/s plunges into a full basin and "
     "its spray falls back otherwise (`inflow_full_basin`), and by 17 % with FLIP faster than sound (`flip_soft`).",
@@ -134,6 +135,7 @@ KNOWN_FAILURES = {
     "one_point": {"halving_peak_force": 0.0491},
     "overhanging_face": {"gaps_bounded_share": 0.233},
     "points_1": {"halving_peak_force": 0.0251},
+    "wet_deposit": {"halving_peak_force": 0.0243},
     "weight_at_once": {"pressure_ratio": 1.02, "gaps_bounded_share": 0.595},
     "weightless": {
         "halving_peak_force": 0.361,
