@@ -80,6 +80,9 @@ class Bench:
     def launch(self, kernel):
         simulation = self.simulation
         (launch,) = (one for one in launches(simulation.effects) if one.kernel == kernel)
+        if launch.over in ("points", "flow"):
+            simulation._launch_over_points(launch)
+            return
         arguments = [simulation._arguments[name] for name in launch.takes]
         simulation._launch(launch, simulation._counts[launch.over], arguments)
 
