@@ -40,7 +40,8 @@ _PATCH_END = "end of the time over which it is a mean"
 
 PATCH = (
     "output.pressure_patch_m of the face and output.pressure_patch_s (0.5 m and 20 ms unless given), or over a cell "
-    "and an interval of the time series where these are greater"
+    "and an interval of the time series where these are greater; on an inclined face each piece of a cell's length "
+    "first gives half of its load to its neighbours"
 )
 
 _ROWS = (

@@ -198,7 +198,8 @@ _ROWS = (
     Sampled(
         "pressure_patch", "Pa",
         "greatest mean of the total normal pressure over output.pressure_patch_m of the impacted face and the last "
-        "output.pressure_patch_s, or the interval where that is longer",
+        "output.pressure_patch_s, or the interval where that is longer; on an inclined face each piece of a cell's "
+        "length first gives half of its load to its neighbours",
         "pressure on a patch of the face", "p", read=lambda now: now.loads.pressure_patch.pressure, there=barrier,
         of_points=False, of_loads=True,
     ),
@@ -211,7 +212,8 @@ _ROWS = (
     Sampled(
         "pore_pressure_patch", "Pa",
         "greatest mean of the liquid's pressure over output.pressure_patch_m of the impacted face and the last "
-        "output.pressure_patch_s, or the interval where that is longer",
+        "output.pressure_patch_s, or the interval where that is longer; on an inclined face shared as pressure_patch "
+        "is",
         "pore pressure on a patch of the face", "p_L", read=lambda now: now.loads.pore_pressure_patch.pressure,
         there=pressed_by_liquid, of_points=False, of_loads=True,
     ),

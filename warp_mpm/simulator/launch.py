@@ -12,9 +12,8 @@ class Launch:
 
     kernel: str
     over: Literal["one", "workers", "points", "flow", "groups", "lanes"]
-    """What its threads count: workers share the blocks of the grid in use; points have one each, and in the flow
-    they take them in turn; groups are of places of contact, and lanes share those that are
-    joined."""
+    """What its threads count: workers share the blocks of the grid in use; points have one each, and in the flow they
+    take them in turn; groups are of places of contact, and lanes share those that are joined."""
     takes: tuple[str, ...]
     """Its arguments, by the names under which the simulation knows them."""
     does: str
