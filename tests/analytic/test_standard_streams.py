@@ -39,7 +39,8 @@ def test_what_an_encoding_lacks_is_spelled(encoding):
 
 
 @pytest.mark.parametrize(
-    "redirection", ["2>&-", ">&-", pytest.param(">&- 2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-"]
+    "redirection",
+    [*(pytest.param(closed, marks=pytest.mark.slow) for closed in ("2>&-", ">&-", ">&- 2>&-")), ">&- 2>&- <&-"],
 )
 def test_closed_streams_stop_nothing(redirection, tmp_path):
     figure = tmp_path / "figure.png"

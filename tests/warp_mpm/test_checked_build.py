@@ -1,6 +1,6 @@
 """The build of the kernels for debugging: an index outside its array ends the process and says where.
 
-It is tried on a dry flow, whose kernels compile in half the time; those of a two-phase one are slow.
+Slow: it is for who looks for an error in a kernel, and takes kernels of its own.
 """
 
 import os
@@ -29,7 +29,7 @@ if sys.argv[2] == "thrown":
 """
 
 
-SCENES = ["case_1_dry", pytest.param("case_1", marks=pytest.mark.slow)]
+pytestmark = pytest.mark.slow
 
 
 def run(name, how, **environment):
@@ -42,7 +42,7 @@ def run(name, how, **environment):
     )
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["case_1_dry", "case_1"])
 def test_an_index_outside_its_array_is_named(load_scene, name):
     """Until then the run goes through, and to the numbers of the plain build."""
     done = run(name, "thrown", WARP_MPM_CHECKED="1")

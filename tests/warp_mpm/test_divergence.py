@@ -117,7 +117,8 @@ def test_a_state_does_not_depend_on_what_is_recorded(coarse_case_1, simulation):
 
 
 def test_a_scene_without_barrier_has_no_place_of_it(load_scene, tmp_path):
-    scenario = load_scene("case_1", barrier=None, **{"numerics.spacing_m": 1.0, "output.end_time_s": 0.01})
+    changes = {"barrier": None, "ground": None, "numerics.spacing_m": 1.0, "output.end_time_s": 0.01}
+    scenario = load_scene("case_1", **changes)
     simulation = Simulation(scenario)
     assert (simulation.barrier_displacement, simulation.barrier_velocity) == (None, None)
     run_scenario(scenario, tmp_path / "run", make_simulation=Simulation)

@@ -170,7 +170,10 @@ BASE = {"bodies.base_friction"}
 """That of the barrier's own base on the soil is another."""
 
 
-@pytest.mark.parametrize("name", ["case_1", "case_1_fixed", "case_1_dry", "case_1_undrained"])
+@pytest.mark.parametrize(
+    "name",
+    ["case_1", "case_1_dry", *(pytest.param(f"case_1_{of}", marks=pytest.mark.slow) for of in ("fixed", "undrained"))],
+)
 def test_without_friction_nothing_of_it_is_there(load_scene, name):
     changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01, "barrier.friction": 0.0}
     smooth = load_scene(name, **changes)
@@ -274,7 +277,12 @@ WITHOUT_INFLUENCE = {
 
 
 @pytest.mark.parametrize(
-    ("name", "present", "absent", "tolerance", "until"), WITHOUT_INFLUENCE.values(), ids=WITHOUT_INFLUENCE
+    ("name", "present", "absent", "tolerance", "until"),
+    [
+        # Two sets of kernels that no other test needs; what happens below yield, test_return_mapping.py has too.
+        pytest.param(*case, id=name, marks=[pytest.mark.slow] * name.startswith("yield"))
+        for name, case in WITHOUT_INFLUENCE.items()
+    ],
 )
 def test_an_effect_without_influence_is_the_same_as_none(load_scene, name, present, absent, tolerance, until):
     scenes = [load_scene(name, **COARSE | changes) for changes in (present, absent)]

@@ -21,9 +21,13 @@ SCENES = {
     "set_i": {"barrier": None}, "set_iib": {"barrier.motion": {"kind": "prescribed", "times_s": [0],
     "velocities_m_per_s": [0.5]}}, "set_v": {"barrier": None, "ground": None},
 }  # fmt: skip
+OWN_KERNELS = ("set_i",)
+"""That no other test needs."""
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in OWN_KERNELS)) for name in SCENES]
+)
 def test_the_quantities_of_a_scene_are_those_that_are_sampled(load_scene, name):
     scenario = load_scene(name, **COARSE | SCENES[name])
     sample = Simulation(scenario).sample()

@@ -68,22 +68,24 @@ def test_dearer_steps_count(load_scene):
 
 
 def test_what_if_switches_one_effect_at_a_time(load_scene, monkeypatch):
-    """Only two effects here, each of which costs a compilation."""
+    """Only two effects here, whose kernels other tests compile too."""
     from warp_mpm.performance import plan
 
-    rules = [rule for rule in plan.effect_rules(load_scene("case_1")) if rule.effect in ("sliding", "drag")]
+    rules = [rule for rule in plan.effect_rules(load_scene("case_1")) if rule.effect in ("drag", "inertial_drag")]
     of_scene = plan.effect_rules
     monkeypatch.setattr(
-        plan, "effect_rules", lambda scenario: [r for r in of_scene(scenario) if r.effect in ("sliding", "drag")]
+        plan, "effect_rules", lambda scenario: [r for r in of_scene(scenario) if r.effect in ("drag", "inertial_drag")]
     )
     assert len(rules) == 2
-    scene = load_scene("case_1", **{"numerics.spacing_m": 0.5, "output.end_time_s": 0.5})
-    base, drag, sliding = what_if(scene)
-    assert (base.effect, drag.effect, sliding.effect) == ("as it is", "drag", "sliding")
+    scene = load_scene(
+        "case_1", **{"barrier": None, "ground": None, "numerics.spacing_m": 0.5, "output.end_time_s": 0.5}
+    )
+    base, drag, inertial = what_if(scene)
+    assert (base.effect, drag.effect, inertial.effect) == ("as it is", "drag", "inertial_drag")
     assert drag.change == "semi-implicit → explicit"
-    assert sliding.change == "on → off"
+    assert inertial.change == "off → on"
     assert drag.steps > 20 * base.steps
-    assert sliding.steps == base.steps
+    assert inertial.steps == base.steps
 
 
 def test_what_if_tells_the_cost_of_every_law(load_scene, monkeypatch):

@@ -8,9 +8,9 @@ from warp_mpm.simulation import Simulation
 
 
 def body(formulation="two_phase"):
-    """A cube of mixture at rest in free space."""
-    material = {"grain_density_kg_per_m3": 2600, "porosity": 0.5, "young_modulus_Pa": 2e6, "poisson_ratio": 0.25,
-                "friction_angle_deg": 20}  # fmt: skip
+    """A cube of mixture, or of a dry elastic material, at rest in free space."""
+    material = {"grain_density_kg_per_m3": 2600, "porosity": 0.5, "young_modulus_Pa": 2e6, "poisson_ratio": 0.25}
+    material |= {"law": "elastic"} if formulation == "dry" else {"friction_angle_deg": 20}
     if formulation != "dry":
         material |= {"liquid_density_kg_per_m3": 1000, "liquid_bulk_modulus_Pa": 3e7}
     if formulation == "two_phase":

@@ -52,7 +52,8 @@ def test_a_run_in_any_encoding(tmp_path, encoding):
 
 
 @pytest.mark.parametrize(
-    "redirection", [pytest.param("2>&-", marks=pytest.mark.slow), ">&- 2>&- <&-", ">/dev/full 2>/dev/full"]
+    "redirection",
+    [*(pytest.param(to, marks=pytest.mark.slow) for to in ("2>&-", ">&- 2>&- <&-")), ">/dev/full 2>/dev/full"],
 )
 def test_a_run_whose_streams_take_nothing(tmp_path, redirection):
     run(tmp_path / "run", redirection, pictures="<&-" in redirection)

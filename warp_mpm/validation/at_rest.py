@@ -122,7 +122,7 @@ NO_EQUILIBRIUM = (
 
 
 def at_rest(quick: bool) -> Outcome:
-    angles = (45.0, 90.0) if quick else (30.0, 45.0, 60.0, 75.0, 90.0)
+    angles = (45.0,) if quick else (30.0, 45.0, 60.0, 75.0, 90.0)
     spacing = 0.5 if quick else 0.25
     end = 2.0 if quick else 6.0
     checks: list[Check] = []
@@ -184,9 +184,9 @@ def at_rest(quick: bool) -> Outcome:
             reported(f"{name}: greatest speed", "of √(g h)", float(found.speed.max())),
         ]
         pressures.append(Curve(found.times, found.pressure, f"{step:g} m"))
-        checks.append(
-            at_most(f"barrier with a reserve of 10 %, soil, 60°, {step:g} m: slides", "m", creep(step, soil_end), 0.0)
-        )
+        if not quick:
+            slid = creep(step, soil_end)
+            checks.append(at_most(f"barrier with a reserve of 10 %, soil, 60°, {step:g} m: slides", "m", slid, 0.0))
     return Outcome(
         checks=checks,
         panels=[
