@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from warp_mpm import cli
 from warp_mpm.live import LivePage
+from warp_mpm.live import page as live_page
 from warp_mpm.recording import read_checkpoint
 from warp_mpm.recording.run_folder import CHECKPOINT
 from warp_mpm.results import Results
@@ -25,6 +26,12 @@ from warp_mpm.run import resume_run, run_scenario
 from warp_mpm.simulation import Simulation
 
 SCENES = Path(__file__).parents[2] / "scenarios"
+
+
+@pytest.fixture(autouse=True)
+def does_not_wait_long(monkeypatch):
+    """At the end, for pages that do not say that they have heard of it."""
+    monkeypatch.setattr(live_page, "LAST_LOOK", 0.3)
 
 
 @pytest.fixture
@@ -165,7 +172,8 @@ def test_pictures_are_made_only_while_somebody_looks(scenario, tmp_path, flying_
 
 
 @pytest.mark.parametrize(("outcome", "words"), [(True, "finished"), (False, "stopped"), (None, "ended: out of luck")])
-def test_an_open_page_hears_of_the_end(scenario, tmp_path, outcome, words):
+def test_an_open_page_hears_of_the_end(scenario, tmp_path, monkeypatch, outcome, words):
+    monkeypatch.setattr(live_page, "LAST_LOOK", 10.0)
     heard = []
     with LivePage(scenario, tmp_path) as page:
         state(page)
