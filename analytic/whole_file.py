@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -28,7 +30,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     with contextlib.ExitStack() as stack:
         try:
             target = path.resolve()
-            special = target.exists() and not target.is_file() and not target.is_dir()
+            if target.is_dir():  # said before the work, not after it
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            special = target.exists() and not target.is_file()
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory())) if special else target.parent
             aside = folder / (target.name + ".new")
             stack.callback(_remove, aside)

@@ -153,7 +153,7 @@ def test_figures_of_runs_can_be_read(runs):
         assert_all_can_be_read(plotting.field_panels(results[:2], field.name))
 
 
-@pytest.mark.parametrize("width", [320, *(pytest.param(width, marks=pytest.mark.slow) for width in (333, 480)), 1280])
+@pytest.mark.parametrize("width", [320, *(pytest.param(width, marks=pytest.mark.slow) for width in (333, 480, 1280))])
 @pytest.mark.parametrize("title", ["Case 1: standing jump, sliding barrier at 60 degrees, 10 m/s", LONG_TITLE])
 def test_pictures_of_a_film_can_be_read(load_scene, flying_points, tmp_path, monkeypatch, width, title):
     figures = []
