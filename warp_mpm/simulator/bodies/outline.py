@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -134,10 +135,9 @@ class Segments:
         middles = np.stack(np.meshgrid(middle_x, middle_y, indexing="ij"), axis=-1).reshape(-1, 2)
         far = (reach + float(np.hypot(half_x, half_y))) * (1.0 + 1e-9)
         apart = self.nearest_within(middles, far)[0].reshape(len(middle_x), len(middle_y))
-        tile = np.arange(len(x))[:, None] // TILE, np.arange(len(y)) // TILE
-        distance = np.copysign(np.inf, apart)[tile]
+        distance = _spread(np.copysign(np.inf, apart), len(x), len(y))
         piece = np.zeros(distance.shape, dtype=np.int64)
-        near = np.nonzero((np.abs(apart) < far)[tile])
+        near = np.nonzero(_spread(np.abs(apart) < far, len(x), len(y)))
         if near[0].size:
             distance[near], _, piece[near] = self.nearest_within(np.column_stack([x[near[0]], y[near[1]]]), reach)
         return distance, piece
@@ -212,6 +212,11 @@ def _tiles(places: Array) -> tuple[Array, float]:
     first = np.arange(0, len(places), TILE)
     low, high = places[first], places[np.minimum(first + TILE, len(places)) - 1]
     return 0.5 * (low + high), 0.5 * float((high - low).max(initial=0.0))
+
+
+def _spread(tiles: NDArray[Any], columns: int, rows: int) -> NDArray[Any]:
+    """What is known of tiles, at each of their places [columns, rows]."""
+    return np.repeat(np.repeat(tiles, TILE, axis=1)[:, :rows], TILE, axis=0)[:columns]
 
 
 class Outline:

@@ -87,13 +87,13 @@ def _distance(
     if len(solid) == 1 and solid.normal[0, 0] == 0.0:
         return np.broadcast_to(solid.normal[0, 1] * y - solid.offset[0], (len(x), len(y)))
     reach = (RUBBED + 1.0) * spacing
+    if not solid.closed:
+        return solid.nearest_on(x, y, reach)[0]
     low = np.full((len(x), len(y)), np.inf)
-    columns, rows = np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool)
-    if solid.closed:
-        box = solid.box(*window)
-        if box is None:
-            return low
-        columns = (x >= box[0] - reach) & (x <= box[1] + reach)
-        rows = (y >= box[2] - reach) & (y <= box[3] + reach)
+    box = solid.box(*window)
+    if box is None:
+        return low
+    columns = (x >= box[0] - reach) & (x <= box[1] + reach)
+    rows = (y >= box[2] - reach) & (y <= box[3] + reach)
     low[np.ix_(columns, rows)] = solid.nearest_on(x[columns], y[rows], reach)[0]
     return low
