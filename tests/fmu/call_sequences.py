@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from forked_worker import forked_workers  # noqa: E402 - found beside this program
+from forked_worker import forked_workers
 
 DISCARD, ERROR = 2, 3
 NUMBERS = [0.0, 1.0, -1.0, 0.5, 0.1, 10.0, 1e5, -1e5, 1e-15, 1e9, 1e200, -1e300, math.inf, -math.inf, math.nan, 5e-324]

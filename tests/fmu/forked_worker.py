@@ -1,6 +1,6 @@
 """Workers of the simulator that are there at once: each is forked off a process that has everything loaded.
 
-    with forked_workers() as python: ...
+    with forked_workers(scenario, spacing) as python: ...
 
 `python` is a program that stands in for the Python that a unit starts its worker with (`WARP_MPM_PYTHON`). It hands its
 standard streams to the process that waits there, which forks; the fork runs the worker's own `main` on them. What a
@@ -40,7 +40,8 @@ def forked_workers(scenario: Path, spacing: float) -> Iterator[Path]:
         program.chmod(0o755)
         command = [sys.executable, "-P", __file__, address, scenario, str(spacing)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-            assert process.stdin is not None and process.stdout is not None
+            assert process.stdin is not None
+            assert process.stdout is not None
             if not process.stdout.readline():
                 raise RuntimeError("no worker can be forked")
             yield program

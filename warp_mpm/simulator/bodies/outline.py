@@ -128,9 +128,9 @@ class Segments:
         return distance, normal, piece
 
     def nearest_on(self, x: Array, y: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
-        """Signed distance and nearest piece [columns, rows] of the places of a grid with `x` [columns] and `y` [rows] in
-        rising order, as `nearest_within`. Of a large grid few places are near: whole tiles of it are told to lie further
-        away than `reach` [m] by their middles."""
+        """Signed distance and nearest piece [columns, rows] of the places of a grid with `x` [columns] and `y` [rows]
+        in rising order, as `nearest_within`. Of a large grid few places are near: whole tiles of it are told to lie
+        further away than `reach` [m] by their middles."""
         (middle_x, half_x), (middle_y, half_y) = _tiles(x), _tiles(y)
         middles = np.stack(np.meshgrid(middle_x, middle_y, indexing="ij"), axis=-1).reshape(-1, 2)
         far = (reach + float(np.hypot(half_x, half_y))) * (1.0 + 1e-9)
