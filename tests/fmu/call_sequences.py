@@ -8,7 +8,9 @@ are written to LOG beforehand, for one that ends the process.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 import sys
 from ctypes import c_double, c_int, c_uint
 from pathlib import Path
@@ -21,10 +23,15 @@ from fmpy.fmi3 import FMU3Slave
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from forked_worker import forked_workers
+
 DISCARD, ERROR = 2, 3
 NUMBERS = [0.0, 1.0, -1.0, 0.5, 0.1, 10.0, 1e5, -1e5, 1e-15, 1e9, 1e200, -1e300, math.inf, -math.inf, math.nan, 5e-324]
 SIZES = [0.1, 0.01, 1.0, 0.0, 1e-15, -0.1, 1e300, math.inf, math.nan]
-QUICK = {"spacing": 1.0}
+QUICK = {"spacing": 1.0, "reply_time_limit": 10.0}
+"""Of the simulator: no call takes long, a step of 1e300 s neither."""
 
 archive, unpacked, count, log = sys.argv[1:]
 description = read_model_description(archive)
@@ -201,4 +208,9 @@ def sequences(calls: list[tuple[Any, ...]]) -> None:
 
 
 if __name__ == "__main__":
-    sequences()
+    with contextlib.ExitStack() as workers:
+        scenario = Path(unpacked) / "resources" / "scenario.json"
+        if scenario.exists():
+            python = workers.enter_context(forked_workers(scenario, QUICK["spacing"]))
+            os.environ["WARP_MPM_PYTHON"] = str(python)
+        sequences()

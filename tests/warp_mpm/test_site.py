@@ -23,6 +23,7 @@ from warp_mpm.shipped import SCENARIOS
 from warp_mpm.simulator.bodies import Outline
 from warp_mpm.simulator.bodies.arrays import effects_of, pieces_by_column
 from warp_mpm.simulator.bodies.kernels import RUBBED
+from warp_mpm.simulator.bodies.outline import Segments
 from warp_mpm.snapshot import Snapshot
 from warp_mpm.validation.scenes import material
 
@@ -238,6 +239,27 @@ def test_near_a_long_profile_only_the_pieces_about_a_place_count():
     for one, other in zip(whole, near, strict=True):
         assert np.array_equal(one[close], other[close])
     assert np.array_equal(np.sign(whole[0]), np.sign(near[0]))
+
+
+@pytest.mark.parametrize("kind", ["profile", "barrier", "closed"])
+def test_of_a_grid_only_the_tiles_about_an_outline_are_looked_at(kind: str, monkeypatch: pytest.MonkeyPatch):
+    random = np.random.default_rng(3)
+    long = np.stack([np.linspace(-60, 60, 50), np.cumsum(random.normal(0, 0.5, 50))], axis=1)
+    corners = {"profile": long, "barrier": [[0, 0], [3, 6], [7, 6], [11, 0]], "closed": [[0, 1], [3, 6], [7, 4]]}
+    pieces = Outline(corners[kind], closed=kind == "closed").segments
+    x, y = 0.1 * np.arange(-533, 467), 0.1 * np.arange(-100, 301)
+    place = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    whole, _, whole_piece = (values.reshape(len(x), len(y), -1).squeeze() for values in pieces.nearest(place))
+    looked_at, nearest = [], Segments.nearest
+    monkeypatch.setattr(Segments, "nearest", lambda self, at: looked_at.append(len(at)) or nearest(self, at))
+    distance, piece = pieces.nearest_on(x, y, 0.4)
+    assert sum(looked_at) < len(place) / 5
+    close = np.abs(whole) < 0.4
+    assert 200 < close.sum() < 20_000
+    assert np.array_equal(distance[close], whole[close])
+    assert np.array_equal(piece[close], whole_piece[close])
+    assert np.array_equal(np.sign(distance), np.sign(whole))
+    assert (np.abs(distance[~close]) >= 0.4).all()
 
 
 def test_every_column_knows_the_pieces_about_it():

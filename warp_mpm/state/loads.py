@@ -43,7 +43,7 @@ class LoadsNow:
     now: Window
     since: Window
 
-    @property
+    @cached_property
     def _rate(self) -> float:
         elapsed = self.now.time - self.since.time
         return 1.0 / elapsed if elapsed > 0.0 else 0.0
@@ -61,7 +61,7 @@ class LoadsNow:
         """Height [m] above the base at which a surface's mean horizontal `force` [N/m] acts; 0 without force."""
         return self._turning[surface][0] / force if force != 0.0 else 0.0
 
-    @property
+    @cached_property
     def toe_moment(self) -> float:
         """Mean moment [N m/m] of all forces of the flow on the barrier about its toe; + turns it downstream."""
         return sum(across - up for across, up in self._turning.values())
@@ -93,8 +93,11 @@ class LoadsNow:
     @cached_property
     def _pressed(self) -> Array:
         """Normal loads [n] of both phases on the face's slots [N/m]."""
-        two_phase = self.scenario.flow.wettest_formulation == "two_phase"
-        return self._sums[:, at.SLOT_NORMAL] + (self._sums[:, at.SLOT_LIQUID] if two_phase else 0.0)
+        return self._sums[:, at.SLOT_NORMAL] + (self._sums[:, at.SLOT_LIQUID] if self._two_phase else 0.0)
+
+    @cached_property
+    def _two_phase(self) -> bool:
+        return self.scenario.flow.wettest_formulation == "two_phase"
 
     @cached_property
     def pressure_patch(self) -> Patch:
@@ -114,8 +117,7 @@ class LoadsNow:
     def pore_pressure_patch(self) -> Patch:
         """Of the liquid's pressure."""
         # With two phases the liquid gets its share of the surface, the porosity at the start.
-        two_phase = self.scenario.flow.wettest_formulation == "two_phase"
-        share = self.scenario.flow.wettest.porosity if two_phase else 1.0
+        share = self.scenario.flow.wettest.porosity if self._two_phase else 1.0
         return self._greatest(self._sums[:, at.SLOT_LIQUID] / share)
 
     def _greatest(self, load: Array) -> Patch:
@@ -125,6 +127,4 @@ class LoadsNow:
         greatest = int(np.argmax(mean >= mean.max() * (1.0 - 1e-9)))
         if not mean[greatest] > 0.0:
             return Patch()
-        face = self.slots.face
-        height = face.place(self.patches.middle[greatest : greatest + 1])[0, 1]
-        return Patch(float(mean[greatest]), float(height))
+        return Patch(float(mean[greatest]), float(self.patches.heights[greatest]))

@@ -63,7 +63,7 @@ class Stretch:
         piece = np.maximum(np.searchsorted(self.starts, way, side="left") - 1, 0)
         return self.begins[piece] + (way - self.starts[piece])[:, None] * self.along[piece]
 
-    @property
+    @cached_property
     def heights(self) -> Array:
         """[n + 1] y of the edges at t = 0 [m]."""
         return self.place(self.edges)[:, 1]
@@ -82,8 +82,8 @@ class Patches:
 
     length: float
     """[m]; that of the surface where it is shorter than what was asked for."""
-    middle: Array
-    """[P] along the surface [m]."""
+    heights: Array
+    """[P] y of their middles at t = 0 [m]."""
     shared: bool
     """Whether slots share their load with their neighbours."""
     _ends: tuple[tuple[NDArray[np.int64], Array], tuple[NDArray[np.int64], Array]]
@@ -101,7 +101,8 @@ class Patches:
             slot = np.clip(np.floor(reach), 0, len(stretch) - 1).astype(np.int64)
             return slot, reach - slot
 
-        return cls(length, low + 0.5 * length, stretch.inclined, (place(low), place(low + length)))
+        heights = stretch.place(low + 0.5 * length)[:, 1]
+        return cls(length, heights, stretch.inclined, (place(low), place(low + length)))
 
     def means(self, load: Array) -> Array:
         """Mean [P] over each patch, of loads [n] of the slots [N/m]; a pressure [Pa]."""

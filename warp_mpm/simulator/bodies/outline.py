@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,9 @@ TIE = 1e-12
 
 FEW = 8
 """Pieces up to which all of an outline's are looked at."""
+
+TILE = 16
+"""Columns and rows of places that are looked at together first."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,21 @@ class Segments:
             distance[at], normal[at], piece[at] = found[close], across[close], own[number[close]]
         return distance, normal, piece
 
+    def nearest_on(self, x: Array, y: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
+        """Signed distance and nearest piece [columns, rows] of the places of a grid with `x` [columns] and `y` [rows]
+        in rising order, as `nearest_within`. Of a large grid few places are near: whole tiles of it are told to lie
+        further away than `reach` [m] by their middles."""
+        (middle_x, half_x), (middle_y, half_y) = _tiles(x), _tiles(y)
+        middles = np.stack(np.meshgrid(middle_x, middle_y, indexing="ij"), axis=-1).reshape(-1, 2)
+        far = (reach + float(np.hypot(half_x, half_y))) * (1.0 + 1e-9)
+        apart = self.nearest_within(middles, far)[0].reshape(len(middle_x), len(middle_y))
+        distance = _spread(np.copysign(np.inf, apart), len(x), len(y))
+        piece = np.zeros(distance.shape, dtype=np.int64)
+        near = np.nonzero(_spread(np.abs(apart) < far, len(x), len(y)))
+        if near[0].size:
+            distance[near], _, piece[near] = self.nearest_within(np.column_stack([x[near[0]], y[near[1]]]), reach)
+        return distance, piece
+
     def _some(self, which: NDArray[np.int64]) -> Segments:
         return Segments(
             self.begin[which],
@@ -186,6 +205,18 @@ class Segments:
             return None
         (x0, y0), (x1, y1) = np.min(found, axis=0), np.max(found, axis=0)
         return np.array([x0, x1, y0, y1])
+
+
+def _tiles(places: Array) -> tuple[Array, float]:
+    """Middles of the tiles that rising places fall into, and half of the longest one's length."""
+    first = np.arange(0, len(places), TILE)
+    low, high = places[first], places[np.minimum(first + TILE, len(places)) - 1]
+    return 0.5 * (low + high), 0.5 * float((high - low).max(initial=0.0))
+
+
+def _spread(tiles: NDArray[Any], columns: int, rows: int) -> NDArray[Any]:
+    """What is known of tiles, at each of their places [columns, rows]."""
+    return np.repeat(np.repeat(tiles, TILE, axis=1)[:, :rows], TILE, axis=0)[:columns]
 
 
 class Outline:

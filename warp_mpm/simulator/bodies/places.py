@@ -190,10 +190,8 @@ def _along_grid(pieces: Segments, grid: GridLayout) -> NDArray[np.bool_]:
 def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]) -> Places:
     """Mirrored pairs of nodes at the pieces along the grid, and the nodes a row further back."""
     x, y = grid.node_positions()
-    place = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    distance, _, nearest = body.outline.segments.nearest_within(place.reshape(-1, 2), 3.0 * grid.spacing)
-    distance = (distance / grid.spacing).reshape(place.shape[:2])
-    nearest = nearest.reshape(place.shape[:2])
+    distance, nearest = body.outline.segments.nearest_on(x, y, 3.0 * grid.spacing)
+    distance /= grid.spacing
     node = np.argwhere((distance < 0.0) & (distance > -ROWS) & on_grid[nearest])
     at = (node[:, 0], node[:, 1])
     piece, normal = nearest[at], body.outline.segments.normal[nearest[at]]
@@ -206,7 +204,7 @@ def _pairs(body: Body, number: int, grid: GridLayout, on_grid: NDArray[np.bool_]
     along_x, along_y = paired & (step[:, 0] != 0), paired & (step[:, 1] != 0)
     first = low - np.stack([~along_x, ~along_y], axis=1)
     return Places(
-        place[node[:, 0], node[:, 1]],
+        np.column_stack([x[node[:, 0]], y[node[:, 1]]]),
         (first[:, 0] * grid.rows + first[:, 1]).astype(np.int32),
         np.where(along_x[:, None], DOUBLE, SINGLE),
         np.where(along_y[:, None], DOUBLE, SINGLE),

@@ -86,16 +86,14 @@ def _distance(
     """Distance [columns, rows] of the corners from the outline; infinite outside the box of a closed one."""
     if len(solid) == 1 and solid.normal[0, 0] == 0.0:
         return np.broadcast_to(solid.normal[0, 1] * y - solid.offset[0], (len(x), len(y)))
-    low = np.full((len(x), len(y)), np.inf)
-    columns, rows = np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool)
-    if solid.closed:
-        box = solid.box(*window)
-        if box is None:
-            return low
-        reach = (RUBBED + 1.0) * spacing
-        columns = (x >= box[0] - reach) & (x <= box[1] + reach)
-        rows = (y >= box[2] - reach) & (y <= box[3] + reach)
-    place = np.stack(np.meshgrid(x[columns], y[rows], indexing="ij"), axis=-1)
     reach = (RUBBED + 1.0) * spacing
-    low[np.ix_(columns, rows)] = solid.nearest_within(place.reshape(-1, 2), reach)[0].reshape(place.shape[:2])
+    if not solid.closed:
+        return solid.nearest_on(x, y, reach)[0]
+    low = np.full((len(x), len(y)), np.inf)
+    box = solid.box(*window)
+    if box is None:
+        return low
+    columns = (x >= box[0] - reach) & (x <= box[1] + reach)
+    rows = (y >= box[2] - reach) & (y <= box[3] + reach)
+    low[np.ix_(columns, rows)] = solid.nearest_on(x[columns], y[rows], reach)[0]
     return low
