@@ -228,6 +228,10 @@ def test_the_flume_is_judged_behind_the_front(monkeypatch, case):
     short = [check.quantity for check in flume(monkeypatch, passed(factor=1.8), case).short]
     assert len(short) == 4
     assert all("share of the times behind the front" in quantity for quantity in short)
+    on_the_pad = passed()
+    on_the_pad.depth[:, 2] *= 1.8
+    (wrong,) = flume(monkeypatch, on_the_pad, case).short
+    assert wrong.quantity.startswith("depth at 90 m")
     late = [check.quantity for check in flume(monkeypatch, passed(late=1.5), case).short]
     assert late == ["arrival at 32 m", "arrival at 66 m"]
 

@@ -303,23 +303,25 @@ def _outcome(given: Given, central: Setting, others: Sequence[Setting], title: s
 
 SHORT = (
     "no start stands in for what the law lacks: a liquefied one runs as if without friction, is at 66 m when a body "
-    "that falls down 31° freely would be, and is half as deep as measured; a hydrostatic one comes to 32 m in time, as "
-    "a film of half a decimetre that runs ahead of its body and is too early farther down; no friction or permeability "
-    "of the ranges changes that; why, see the next case; spacings from 0.2 to 0.05 m agree on arrival and depth, not "
-    "yet on the stresses, which the lowest of one to three cells shows"
+    "that falls freely down 31° would be, 5.1 s, and 40 % too shallow there; a hydrostatic one is at 32 and 66 m in "
+    "time, after 3.6 to 4.2 and 6 to 7 s, yet as a film of 0.1 m whose body stays in the hopper or comes seconds "
+    "later, and at 90 m three seconds early; no friction or permeability of the ranges changes that; why, see the next "
+    "case; spacings from 0.2 to 0.05 m agree on arrival and depth, not yet on the stresses, which the lowest of one to "
+    "three cells shows"
 )
 """Why the aim is missed, written after the run."""
 
 CAUSE = (
     "with dilatancy the mixture liquefies as it leaves the hopper, as it should, and comes to 32 m, with the doors' "
-    "time, when the experiments do; but it goes on as if without friction and is at 66 m two seconds before them. What "
-    "is missing the measurements show: at 32 m there is pore pressure from the first contact on, at 66 m there is "
+    "time, when the experiments do; but it goes on as if without friction and is at 66 m 1.6 to 2.9 s before them. "
+    "What is missing the measurements show: at 32 m there is pore pressure from the first contact on, at 66 m there is "
     "none, under 0.1 kPa, in the first half second behind the front, some 5 m of it. Such a dry front, of 40.7° on a "
     "slope of 31°, loses 2 m/s each second and dams up what follows: measured fronts run from 32 to 66 m with 7.5 and "
-    "11 m/s, ours with 17. Coarse grains gather there and the water drains from them; a material of one grain size "
-    "cannot part so, and no density, friction, permeability, viscosity or start of the ranges, no friction that grows "
-    "with the rate and no spacing stands in for it. Too little to be the cause: the doors (0.56 s), the side walls (4 "
-    "% of what drives the flow), the bed's range of friction (0.3 s)"
+    "11 m/s, ours with 18. Coarse grains gather there and the water drains from them; a material of one grain size "
+    "cannot part so, and no density, friction, permeability, viscosity or start of the ranges and no spacing stands in "
+    "for it. A friction that grows with the rate slows a hydrostatic start, to 6.8 s at 66 m, as a film of 0.07 m, and "
+    "a liquefied one not at all. Too little to be the cause: the doors (0.56 s), the side walls (4 % of what drives "
+    "the flow), the bed's range of friction (0.3 s at 66 m)"
 )
 """Why the aims are missed with dilatancy too: what the measurements themselves say of it."""
 

@@ -130,7 +130,7 @@ PRESSED = (
 MOVED = (
     "ours sets out at 4 m/s², almost as if nothing held it, the experiment's at 1 m/s² throughout. Three things let "
     "it: it is let go at once; a skeleton of a = 0.3 has a shear modulus of 10 kPa and moves two decimetres before its "
-    "friction is called up, which a stiffer one halves, but that liquefies within 0.3 s; and with the head measured at "
+    "friction is called up, which a stiffer one halves, but that liquefies within 0.5 s; and with the head measured at "
     "the start, 35 cm, friction of 38° bears only 0.84 of the pull on a long slope, whatever the stiffness: what held "
     "the experiment, beside the crest, are the sides of a flume of 2 m, which are not in the model and bear, by their "
     "friction on 0.65 m of soil, a tenth or two of its weight. No law or parameter in a plane stands in for them"
