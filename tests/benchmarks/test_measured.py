@@ -386,7 +386,7 @@ def test_water_runs_onto_a_wall():
 
 KNOWN_SHORT: dict[str, tuple[str, ...]] = {
     "water-on-a-wall": ("∫ p* dt*", "window means", "greatest p*", "front, rms", "x = 1.114 m", "x = 1.3625 m"),
-    "water-behind-a-gate": ("30 mm: ∫", "80 mm: ∫", "window means", "greatest p*", "x = 1.3625 m"),
+    "water-behind-a-gate": ("30 mm: ∫", "80 mm: ∫", "window means", "greatest p*", "x = 1.114 m", "x = 1.3625 m"),
     "buchner-wall": ("P1: mean", "P1: first peak"),
     "fronts": ("n² = 1, a = 57 mm: front", "H = 0.6 m: front", "Koshizuka and Oka, n² = 2: front"),
     "loose-wedge": ("head in the middle", "way of the surface"),
