@@ -47,12 +47,20 @@ def measured_cases(given: Given) -> tuple[Case, ...]:
         measured_case(
             "debris-flume",
             "Debris in a flume of 95 m",
-            "About 10 m³ of sand and gravel, without and with mud, let go at t = 0 down a rough bed of 31°: "
-            "depth, normal stress and pore pressure on the bed at 32 and 66 m; three spacings, and every corner of "
-            "the published ranges.",
+            "About 10 m³ of sand and gravel, without and with mud, let go at t = 0 down a rough bed of 31° onto a pad "
+            "of 2.5°: arrival and depth at 32, 66 and 90 m, normal stress and pore pressure on the bed; the paper's "
+            "law at three spacings, and every corner of the published ranges.",
             "Iverson, Logan, LaHusen and Berti (2010), J. Geophys. Res. 115, F03005, ensemble means and deviations; "
             "settings as published for D-Claw",
             debris_flume.debris_flume,
+            given,
+        ),
+        measured_case(
+            "debris-flume-dilatancy",
+            "Debris in a flume of 95 m, with dilatancy",
+            "The same with a skeleton that shrinks as it is sheared, and with a friction that grows with the rate.",
+            "as above; Iverson and George (2014)",
+            debris_flume.debris_flume_dilatancy,
             given,
         ),
         measured_case(
