@@ -56,6 +56,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     conductivity = wettest.conductivity_law if isinstance(wettest, TwoPhaseMaterial) else "constant"
     dilatancy = next((material.dilatancy for material in materials if material.dilatancy is not None), None)
     kinds = tuple(dict.fromkeys(kind_of(material) for material in materials))
+    porosities = {one.porosity for one in materials if isinstance(one, TwoPhaseMaterial)}
     differ = formulation != "dry" and len({_told_to_nodes(material) for material in materials}) > 1
     return [
         Rule(
@@ -115,6 +116,15 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             else "one material"
             if len(materials) == 1
             else "the nodes need no material's own numbers",
+        ),
+        Rule(
+            "unlike_porosity",
+            len(porosities) > 1,
+            f"wet materials of two phases have porosities from {min(porosities):g} to {max(porosities):g}"
+            if len(porosities) > 1
+            else "there are no two phases"
+            if not porosities
+            else "all that is wet has one porosity",
         ),
         Rule(
             "kinds",
