@@ -193,6 +193,8 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
             "Of a flow that arrives the greatest depth and velocity are taken, and all of its volume; several surges "
             "are taken as one."
         )
+        if any(part.material != flow.material for part in flow.arriving):
+            remarks.append("What arrives counts with its own mass, and in all else as of flow.material.")
     if flow.deposits:
         remarks.append("The deposits are left out.")
     if velocity_x <= 0:
@@ -211,7 +213,7 @@ def scene_of(scenario: Scenario, name: str = "The scenario") -> Scene:
         remarks.append("Further barriers are left out.")
     return Scene(
         title=scenario.title,
-        flow_mass=flow.volume * flow.material.density,
+        flow_mass=flow.mass,
         flow_length=flow.equivalent_length,
         flow_height=flow.depth,
         speed=velocity_x,

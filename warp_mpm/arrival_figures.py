@@ -70,7 +70,7 @@ def arrival_figures(scenario: Scenario, series: Mapping[str, Array], figures: Ma
             found["overtopped_volume"] = came_beyond(scenario, beyond, barrier.shape.crest_end)
     if flow.inflow is not None:
         arrived = "inflow_mass" in series
-        found["inflow_volume"] = float(series["inflow_mass"][-1]) / flow.material.density if arrived else None
+        found["inflow_volume"] = flow.arrived_volume(float(series["inflow_mass"][-1])) if arrived else None
     if found and figures.get("left_volume") is not None:
         left = series.get("left_mass")
         known = None if left is None else float(left[-1]) / flow.material.density

@@ -8,11 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from warp_mpm.effect_rules import derive_effects
 from warp_mpm.extent import domain_caveats
 from warp_mpm.quantities.quantity import of_width
 from warp_mpm.scenario import Prescribed, Scenario, Sliding, UndrainedMaterial
-from warp_mpm.scenario.flow import formulation_of
 from warp_mpm.simulator.laws import LAWS
 from warp_mpm.slips import slips
 
@@ -49,7 +47,6 @@ def scene_caveats(scenario: Scenario) -> list[str]:
         *_unlikely_friction(scenario),
         *_impossible_start(scenario),
         *_abrupt_inflow(scenario),
-        *_unlike_porosity(scenario),
     ]
     uneven = scenario.ground is not None and scenario.ground.profile_m is not None
     if scenario.barrier is not None and not uneven and not _can_arrive(scenario):
@@ -77,22 +74,6 @@ def _abrupt_inflow(scenario: Scenario) -> list[str]:
         f"flow.inflow: the velocity changes so fast at t = {inflow.times[first]:g} s that what approaches the section "
         f"would stretch by {asked[first]:.3g} of its length a second; {most[first]:.3g} is the most that is followed, "
         "and the flow makes up for the rest once it is let go."
-    ]
-
-
-def _unlike_porosity(scenario: Scenario) -> list[str]:
-    """Where friction by the effective stress does not know which part of a pressure each phase bears."""
-    flow = scenario.flow
-    if not derive_effects(scenario).friction:
-        return []
-    wet = [one for one in flow.materials if formulation_of(one) == "two_phase"]
-    porosities = sorted({one.porosity for one in wet})
-    if len(porosities) < 2:
-        return []
-    return [
-        f"flow.deposits: materials of two phases have porosities from {porosities[0]:g} to {porosities[-1]:g}; where "
-        "they meet at a rough face, friction there is off and hangs on the time step: the sliding distance by a tenth. "
-        "Give them one porosity, or look at what half the numerics.courant_number makes of it."
     ]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
-from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Skeleton, Sliding, Trapezoid
 from warp_mpm.scenario.flow import formulation_of
 from warp_mpm.scenario.inflow import surges_of
 
@@ -88,16 +88,38 @@ def _arriving(scenario: Scenario) -> list[str]:
         late = inflow.volume - inflow.volume_until(scenario.output.end_time_s)
         if late > 1e-9 * inflow.volume:
             words.append(f"of it {late:.4g} m³/m after the end of the run")
+        words += _materials_arriving(scenario)
     if flow.deposits:
         words.append(
             f"{len(flow.deposits)} deposit{'s' if len(flow.deposits) > 1 else ''} of {flow.deposited_volume:.4g} m³/m"
         )
         words += [
-            f"deposit {number} {formulation_of(own).replace('_', '-')}, {own.law}, {own.density:,.0f} kg/m³"
+            f"deposit {number} {_told(own)}"
             for number, own in enumerate(map(flow.material_of, flow.deposits))
             if own != flow.material
         ]
     return ["; ".join(words)] if words else []
+
+
+def _materials_arriving(scenario: Scenario) -> list[str]:
+    """Of what arrives, materials that are not the flow's."""
+    flow = scenario.flow
+    found: dict[float, list[Skeleton]] = {}
+    for part in flow.arriving:
+        found.setdefault(part.begin, []).append(part.material)
+    words = []
+    for begin, own in found.items():
+        if own != [flow.material]:
+            densities = [one.density for one in own]
+            among = f" to {max(densities):,.0f} kg/m³" if len(own) > 1 else ""
+            lightest = own[int(np.argmin(densities))]
+            words.append(("" if begin < 0.0 else f"from t = {begin:g} s on ") + f"{_told(lightest)}{among}")
+    return words
+
+
+def _told(material: Skeleton) -> str:
+    """A material in three words."""
+    return f"{formulation_of(material).replace('_', '-')}, {material.law}, {material.density:,.0f} kg/m³"
 
 
 def described_material(scenario: Scenario) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from warp_mpm import geometry
 from warp_mpm.scenario import Inflow, Scenario, Skeleton
-from warp_mpm.scenario.flow import formulation_of
+from warp_mpm.scenario.flow import formulation_of, part_at
 from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.scenario.other_material import OtherMaterial
 from warp_mpm.simulator.laws import LAWS
 
 Array = NDArray[np.float64]
@@ -53,9 +54,9 @@ class MaterialPoints:
     velocity: Array
     """[N, 2] m/s, of both phases; zeros of what has yet to arrive."""
     entry: Array
-    """[N] way of the inflow [m] at which a point comes into the approach, increasing; -inf of what is there at the
-    start. Until then its x is the one that it would have had at way 0, were the flow to go on upstream, and its y that
-    at the section."""
+    """[N] way of the inflow [m] at which a point comes into the approach, increasing among those of one material; -inf
+    of what is there at the start, which comes first. Until then its x is the one that it would have had at way 0, were
+    the flow to go on upstream, and its y that at the section."""
     pace: Array
     """[N] velocity of what arrives over the mean over its depth [-]; 0 of what is there at the start."""
     material: NDArray[np.int32]
@@ -70,7 +71,7 @@ class MaterialPoints:
     @property
     def there(self) -> int:
         """How many are there at the start; the others arrive."""
-        return int(np.searchsorted(self.entry, -math.inf, side="right"))
+        return int((~self.waits).sum())
 
     @property
     def waits(self) -> NDArray[np.bool_]:
@@ -88,8 +89,8 @@ class ArrivingPoints:
     """[N] m below the surface."""
     entry: Array
     pace: Array
-    pore_pressure_ratio: Array | None
-    """[N] λ_p; None: that of the flow."""
+    way: Array
+    """[N] way of the inflow [m] at which a point passes the section."""
 
 
 @dataclass(frozen=True)
@@ -253,13 +254,9 @@ def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> Arr
     start = inflow.x_m - pace * ways
     entry = ways - APPROACH * spacing / pace
     order = np.argsort(entry, kind="stable")
-    ratio = None
-    if inflow.pore_pressure_ratios is not None:
-        given = np.interp(_time_of(inflow, ways), inflow.times, inflow.pore_pressure_ratios)
-        ratio = given[order]
     position = np.stack([start, inflow.base + 0.5 * (low + high)], axis=1)
     below = depth - 0.5 * (low + high)
-    return ArrivingPoints(position[order], volumes[order], below[order], entry[order], pace[order], ratio)
+    return ArrivingPoints(position[order], volumes[order], below[order], entry[order], pace[order], ways[order])
 
 
 def _time_of(inflow: Inflow, way: Array) -> Array:
@@ -312,24 +309,16 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         velocity = _velocity(scenario, outline, *filled[:3])
         parts.append(_Part(*filled, flow.pore_pressure_ratio, lateral, flow.material, velocity, outline))
     for deposit in flow.deposits:
-        own, material = deposit.lateral_stress_coefficient, flow.material_of(deposit)
-        if own is None:
-            other = deposit.material is not None or deposit.formulation is not None
-            own = LAWS.named(material.law).lateral_stress_ratio(material) if other else lateral
-        outline = deposit.shape.polygon
+        material, outline = flow.material_of(deposit), deposit.shape.polygon
+        own = _lateral(scenario, deposit, material)
         parts.append(_Part(*_filled(scenario, outline), lambda _: None, own, material, outline=outline))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
         coming = arriving_points(flow.inflow, numerics.spacing_m, numerics.points_per_cell)
-        ratio: float | Array | None = coming.pore_pressure_ratio
-        if ratio is None:
-            ratio = flow.pore_pressure_ratio(np.full(len(coming.volume), flow.inflow.x_m))
-        slope = np.full(len(coming.volume), flow.inflow.slope)
-        parts.append(
-            _Part(coming.position, coming.volume, coming.below, slope, lambda _: ratio, lateral, flow.material)
-        )
-        entry, pace = np.concatenate([entry, coming.entry]), np.concatenate([pace, coming.pace])
+        for chosen, part in _by_material(scenario, flow.inflow, coming):
+            parts.append(part)
+            entry, pace = np.append(entry, coming.entry[chosen]), np.append(pace, coming.pace[chosen])
     stresses = [_initial_stress(scenario, part, parts) for part in parts]
     volume = np.concatenate([part.volume for part in parts])
     materials = flow.materials
@@ -346,6 +335,38 @@ def material_points(scenario: Scenario) -> MaterialPoints:
         pace=pace,
         material=place.astype(np.int32),
     )
+
+
+def _lateral(scenario: Scenario, body: OtherMaterial, material: Skeleton) -> float:
+    """K0 of a body that may be of another material than the flow's."""
+    if body.lateral_stress_coefficient is not None:
+        return body.lateral_stress_coefficient
+    return LAWS.named(material.law).lateral_stress_ratio(material) if body.other else scenario.flow.lateral_stress_ratio
+
+
+def _by_material(
+    scenario: Scenario, inflow: Inflow, coming: ArrivingPoints
+) -> Iterator[tuple[NDArray[np.int64], _Part]]:
+    """Of what arrives, the points [M] that are of one material and the part that they make, by material."""
+    flow, parts = scenario.flow, scenario.flow.arriving
+    time = _time_of(inflow, coming.way)
+    place = part_at(parts, time, inflow.density(time))
+    given = flow.pore_pressure_ratio(np.full(len(time), inflow.x_m))
+    if inflow.pore_pressure_ratios is not None:
+        given = np.interp(time, inflow.times, inflow.pore_pressure_ratios)
+    for number, part in enumerate(parts):
+        chosen = np.flatnonzero(place == number)
+        ratio = None if formulation_of(part.material) == "dry" else given
+        own = ratio[chosen] if isinstance(ratio, np.ndarray) else ratio
+        slope = np.full(len(chosen), inflow.slope)
+        lateral = _lateral(scenario, part.own, part.material)
+        places = coming.position[chosen], coming.volume[chosen], coming.below[chosen], slope
+        yield chosen, _Part(*places, _alike(own), lateral, part.material)
+
+
+def _alike(ratio: float | Array | None) -> Callable[[Array], float | Array | None]:
+    """A ratio that is known already, as if it were one of the place."""
+    return lambda _: ratio
 
 
 def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array, Array, Array]:

@@ -9,6 +9,7 @@ from typing import Any
 from .effects import Effects, Kind
 from .scenario import DryFlow, Ground, Scenario, Skeleton, TwoPhaseFlow, TwoPhaseMaterial, UndrainedMaterial
 from .scenario.flow import formulation_of
+from .scenario.other_material import OtherMaterial
 from .simulator.bodies.of_scene import ground_body
 from .simulator.bodies.outline import FEW
 from .simulator.laws import LAWS
@@ -55,6 +56,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
     conductivity = wettest.conductivity_law if isinstance(wettest, TwoPhaseMaterial) else "constant"
     dilatancy = next((material.dilatancy for material in materials if material.dilatancy is not None), None)
     kinds = tuple(dict.fromkeys(kind_of(material) for material in materials))
+    porosities = {one.porosity for one in materials if isinstance(one, TwoPhaseMaterial)}
     differ = formulation != "dry" and len({_told_to_nodes(material) for material in materials}) > 1
     return [
         Rule(
@@ -62,7 +64,7 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             formulation,
             f"flow.formulation = {flow.formulation}"
             if formulation == flow.formulation
-            else f"a deposit has the formulation {formulation}",
+            else f"another material has the formulation {formulation}",
             without_liquid(scenario),
         ),
         Rule("law", LAWS.key(flow.material.law), f"flow.material.law = {flow.material.law}", _another_law(scenario)),
@@ -114,6 +116,15 @@ def _material_rules(scenario: Scenario) -> list[Rule]:
             else "one material"
             if len(materials) == 1
             else "the nodes need no material's own numbers",
+        ),
+        Rule(
+            "unlike_porosity",
+            len(porosities) > 1,
+            f"wet materials of two phases have porosities from {min(porosities):g} to {max(porosities):g}"
+            if len(porosities) > 1
+            else "there are no two phases"
+            if not porosities
+            else "all that is wet has one porosity",
         ),
         Rule(
             "kinds",
@@ -332,8 +343,8 @@ def without_liquid(scenario: Scenario) -> dict[str, Any]:
 
 
 def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
-    """Changes that give the skeleton another law and leave all else, the initial stress too, as it is; deposits keep
-    what is no field of the old law.
+    """Changes that give the skeleton another law and leave all else, the initial stress too, as it is; what has a
+    material of its own keeps of it what is no field of a law.
 
     Args:
         scenario: the scene.
@@ -345,13 +356,18 @@ def with_law(scenario: Scenario, law: str, **own: Any) -> dict[str, Any]:
     if not LAWS.named(law).dilates:
         dropped.add("dilatancy")
     kept = {name: value for name, value in flow["material"].items() if name not in dropped}
-    changed: dict[str, Any] = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio, "deposits": []}
-    for deposit, there in zip(scenario.flow.deposits, flow["deposits"], strict=True):
-        if deposit.material and deposit.lateral_stress_coefficient is None:
-            lies = LAWS.named(scenario.flow.material.law).lateral_stress_ratio(scenario.flow.material_of(deposit))
-            there["lateral_stress_coefficient"] = lies
-        other = {name: value for name, value in (deposit.material or {}).items() if name not in dropped}
-        changed["deposits"].append(there | {"material": other or None})
+    changed: dict[str, Any] = {"lateral_stress_coefficient": scenario.flow.lateral_stress_ratio}
+    inflow = scenario.flow.inflow
+    others: list[tuple[OtherMaterial, Any]] = [*zip(scenario.flow.deposits, flow["deposits"], strict=True)]
+    if inflow is not None:
+        others += [(inflow, flow["inflow"]), *zip(inflow.surges, flow["inflow"]["surges"], strict=True)]
+    for body, there in others:
+        material = scenario.flow.material_of(body)
+        if body.material and body.lateral_stress_coefficient is None:
+            there["lateral_stress_coefficient"] = LAWS.named(material.law).lateral_stress_ratio(material)
+        gone = dropped | set(LAWS.named(material.law).Settings.model_fields)
+        said = {name: value for name, value in (body.material or {}).items() if name not in gone}
+        there["material"] = said or None
     return {"flow": flow | changed | {"material": kept | {"law": law, **own}}}
 
 

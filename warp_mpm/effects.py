@@ -82,6 +82,8 @@ class Effects:
     """Some of the flow arrives at a section during the run."""
     materials: bool = False
     """Materials differ in what a node must know of them per mass of the solid, so that the points tell it."""
+    unlike_porosity: bool = False
+    """Wet materials of two phases differ in porosity, so that nodes share the pressure out by their own."""
     kinds: tuple[Kind, ...] = ()
     """Kinds of the scene's materials, that of the flow first, where there are several; `law` is then that of the first,
     the formulation that of the wettest, and a scene dilates where one of them does."""
@@ -128,7 +130,7 @@ class Effects:
         if not self.materials:
             return ()
         of_phases = ("liquid", "drag", *(["drag_beyond"] if self.inertial_drag else [])) if self.two_phase else ()
-        return (*of_phases, *(["filling"] if self.liquid_alone else []))
+        return (*of_phases, *(["filling"] if self.liquid_alone or self.unlike_porosity else []))
 
     @property
     def partly_dry(self) -> bool:
@@ -196,6 +198,7 @@ class Effects:
                 "passing",
                 "arriving",
                 "materials",
+                "unlike_porosity",
                 "profile",
             )
             if getattr(self, name)

@@ -269,13 +269,18 @@ class Simulation:
             "parameters": self._parameters,
             "book": self._book,
         }
-        self._entry = initial.entry[initial.there :]
+        self._entry = [
+            initial.entry[part.begin : part.end][initial.waits[part.begin : part.end]] for part in initial.spans
+        ]
+        """Of each span, the ways at which its points that wait come."""
         self._counts = {"one": 1, "workers": self._workers}
         if self.effects.bodies:
             self._counts |= {"groups": len(self._contact_arrays["block"]), "lanes": 1 if self.device.is_cpu else LANES}
         self._graph: Any = None
-        self._in_flow = (0, 0, 0)
-        """Entries FLOW_... of what the kernels over the flow go over, were all points one span."""
+        self._in_flow: list[tuple[int, int, int]] = []
+        """Of each span, entries FLOW_... of what the kernels over the flow go over."""
+        self._threads = [0] * len(self._spans)
+        """Of each span, its points that `update` goes over."""
         self._make_room(0.0)
         self._on_launch: Callable[[str], None] | None = None
         self._commands: list[tuple[str, Any]] | None = None
@@ -384,12 +389,12 @@ class Simulation:
 
     def _launch_over_points(self, launch: Launch) -> None:
         """Once for each span of points of one material, as far as they can have arrived."""
-        for part, own in self._spans:
+        for (part, own), count in zip(self._spans, self._threads, strict=True):
             arguments = self._arguments | own
-            count = min(self._counts["points"], part.end) - part.begin
             kernels = self._kernels.of_kinds[self._kinds[part.material]]
-            if count > 0 and hasattr(kernels, launch.kernel):  # some are only another kind's
-                threads = {"workers": self._workers, "flow": self._in_turn(count)}.get(launch.over, count)
+            flow = self._in_turn(count) if count else 0
+            threads = {"workers": self._workers, "flow": flow}.get(launch.over, count)
+            if threads > 0 and hasattr(kernels, launch.kernel):  # some are only another kind's
                 self._launch(launch, threads, [arguments[name] for name in launch.takes], kernels)
 
     def _in_turn(self, count: int) -> int:
@@ -413,30 +418,34 @@ class Simulation:
         Those over the flow are told how many these are. `update` has a thread for each point, so that it is captured
         anew, for some more points at a time.
         """
-        inflow, waiting = self.scenario.flow.inflow, len(self._entry)
-        come = 0
-        if inflow is not None:
-            # On the device the way is summed up in other pieces.
-            come = int(np.searchsorted(self._entry, inflow.way(until) + 1e-6 * self.grid.spacing, side="right"))
-        there = self.material_points - waiting
-        share = max(1, -(-waiting // GROWTHS))
-        threads = there + min(waiting, -(-come // share) * share)
-        if threads > self._counts.get("points", -1):
-            self._counts["points"] = threads
+        inflow = self.scenario.flow.inflow
+        # On the device the way is summed up in other pieces.
+        way = inflow.way(until) + 1e-6 * self.grid.spacing if inflow is not None else 0.0
+        share = max(1, -(-sum(map(len, self._entry)) // GROWTHS))
+        before = self._in_flow or [(0, 0, 0)] * len(self._spans)
+        state = self._point_arrays["inside"].numpy() if inflow is not None else None
+        ends, arriving, threads = [], [], []
+        for (part, _), entry, (_, begin, _), so_far in zip(
+            self._spans, self._entry, before, self._threads, strict=True
+        ):
+            there = part.end - part.begin - len(entry)
+            come = int(np.searchsorted(entry, way, side="right"))
+            threads.append(max(so_far, there + min(len(entry), -(-come // share) * share)))
+            ends.append(there + come)
+            begin = max(begin, there)
+            if state is not None:
+                own = state[part.begin + begin : part.begin + there + come]
+                not_yet = (own == at.WAITING) | (own == at.HELD)
+                begin += int(not_yet.argmax()) if not_yet.any() else len(own)
+            arriving.append(begin)
+        if threads != self._threads:
+            self._threads, self._counts["points"] = threads, sum(threads)
             self._graph = None
-        end, arriving = there + come, self._in_flow[at.FLOW_ARRIVING]
-        if inflow is not None:
-            state = self._point_arrays["inside"].numpy()[arriving:end]
-            not_yet = (state == at.WAITING) | (state == at.HELD)
-            arriving += int(not_yet.argmax()) if not_yet.any() else len(state)
-        in_flow = (end, arriving, self._in_turn(self._counts["points"]))
+        step = self._in_turn(max(threads))
+        in_flow = [(end, begin, step) for end, begin in zip(ends, arriving, strict=True)]
         if in_flow != self._in_flow:
             self._in_flow = in_flow
-            of_spans = [
-                (min(end, part.end) - part.begin, max(arriving - part.begin, 0), in_flow[at.FLOW_STEP])
-                for part, _ in self._spans
-            ]
-            self._clock_arrays["flow"].assign(np.array(of_spans, dtype=np.int32).ravel())
+            self._clock_arrays["flow"].assign(np.array(in_flow, dtype=np.int32).ravel())
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -563,7 +572,7 @@ class Simulation:
         Raises:
             ValueError: the run has begun, or a field is unknown here, of another shape or not finite.
         """
-        if len(self._entry):
+        if any(map(len, self._entry)):
             raise ValueError("set_points knows no flow that arrives (flow.inflow)")
         if self.channel is not None and not {"solid_velocity", "liquid_velocity"}.isdisjoint(state):
             raise ValueError("set_points knows no velocities in three dimensions yet")
@@ -924,7 +933,7 @@ class Simulation:
         state = saved.unpacked(data, self._state())
         for name, array in self._state_arrays().items():
             array.assign(state[name])
-        self._in_flow = (0, 0, 0)  # found anew
+        self._in_flow = []  # found anew
         self._initial_momentum = state["initial_momentum"].tolist()
         (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
         self._since = replace(

@@ -101,7 +101,7 @@ def _barrier(scenario: Scenario) -> list[str]:
                 "barrier.shape.base_width_m, crest_width_m and height_m."
             )
     if isinstance(barrier.motion, Sliding):
-        found += _weight(barrier, scenario.flow.volume * scenario.flow.material.density)
+        found += _weight(barrier, scenario.flow.mass)
     return found
 
 

@@ -82,18 +82,6 @@ def test_what_may_be_meant_is_not_called_a_slip(load_scene, changes):
     assert [sentence for sentence in found if about_the_domain not in sentence] == []
 
 
-def test_wet_materials_of_unlike_porosity_at_a_rough_face_are_told(load_scene):
-    heap = {"shape": {"kind": "polygon", "vertices_m": [[-2.9, 0], [0, 0], [0, 1], [-1.9, 1]]}}
-    other = {"flow.deposits": [heap | {"material": {"porosity": 0.3}}]}
-    (told,) = scene_caveats(load_scene("case_1", **other))
-    assert "porosities from 0.3 to 0.5" in told
-    smooth = {"barrier.friction.face": 0.0, "barrier.friction.top": 0.0, "barrier.friction.back": 0.0}
-    for sound in (other | smooth, {"flow.deposits": [heap | {"material": {"grain_density_kg_per_m3": 3000.0}}]}):
-        assert scene_caveats(load_scene("case_1", **sound)) == []
-    dry = {"flow.deposits": [heap | {"formulation": "dry", "material": {"porosity": 0.3}}]}
-    assert scene_caveats(load_scene("case_1", **dry)) == []
-
-
 def test_an_elastic_skeleton_bears_any_lateral_stress(load_scene):
     pressed = load_scene("case_1", **{"flow.lateral_stress_coefficient": 10})
     assert len(scene_caveats(pressed)) == 1

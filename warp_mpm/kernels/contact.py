@@ -130,7 +130,6 @@ def make_contact(
             of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
-            filling_twice = F(0.0)
             per_mass = contact.per_mass[e]
             for k in range(AROUND):
                 if per_mass[k] > F(0.0):
@@ -146,7 +145,6 @@ def make_contact(
                     if CARRIED:
                         filled = ratio_of_filling(told, parameters)
                         filling += w * filled
-                        filling_twice += w * per_mass[k] * filled
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
@@ -164,8 +162,9 @@ def make_contact(
                     contact.drag_per_mass[e] = drag * inverse_total
             if CARRIED:
                 contact.filling_ratio[e] = larger(filling * inverse_total, F(wp.static(WEIGHTLESS)))
-                squared = contact.filling_ratio[e] * contact.filling_ratio[e]
-                contact.filling_inverse[e] = again * filling_twice / squared
+                if TWO_PHASE:
+                    both = contact.liquid_ratio[e] * contact.filling_ratio[e]
+                    contact.filling_inverse[e] = again * of_liquid_twice / both
         if total < F(wp.static(REACHED)):
             result = F(0.0)
         elif read(contact.fixed, e) == 0:
@@ -194,19 +193,24 @@ def make_contact(
 
     @wp.func
     def seen_alone(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> X:
-        """Velocity of the liquid alone at the place."""
+        """Velocity of the liquid alone at the place, seen with the weights of the phase that contact holds there: with
+        others what is left of its velocity would not be nil, and would count as a force in every step."""
         first = read(contact.first, e)
-        if MATERIALS:
+        layer = layer_of(parameters)
+        if LIQUID_WEIGHTS:
             result = X()
             weight = contact.weight[e]
             for k in range(AROUND):
                 node = node_of(first, k, parameters)
                 mass = read(grid.mass, node)
                 if mass > F(0.0):
-                    filled = ratio_of_filling(read(grid.told, node) / mass, parameters) / contact.filling_ratio[e]
-                    result += weight[k] * filled * read(grid.liquid_alone, node)
+                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                    result += weight[k] * of_liquid * read(grid.liquid_alone, node)
         else:
-            result = seen_at(grid.liquid_alone, first, parameters.rows, layer_of(parameters), contact.weight, e)
+            result = seen_at(grid.liquid_alone, first, parameters.rows, layer, contact.weight, e)
+            if MATERIALS:
+                gain = seen_at(grid.filling_gain, first, parameters.rows, layer, contact.weight, e)
+                result += (F(1.0) / contact.filling_ratio[e]) * gain
         return result
 
     @wp.func
@@ -457,7 +461,7 @@ def make_contact(
                 if CARRIED:
                     alone = seen_alone(contact, e, grid, parameters) - surface
                     filling = filling_ratio(contact, e, parameters)
-                    if MATERIALS:
+                    if LIQUID_WEIGHTS:
                         alone_mass = F(1.0) / weightless_if_nil(contact.filling_inverse[e])
                     else:
                         alone_mass = filling * mass

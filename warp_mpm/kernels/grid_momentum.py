@@ -22,7 +22,8 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
     MATERIALS = "liquid" in types.told
     told_of = make_told(types)
     ratio_of_liquid, drag_per_mass = told_of.ratio_of_liquid, told_of.drag_per_mass
-    drag_beyond_per_mass = told_of.drag_beyond_per_mass
+    drag_beyond_per_mass, ratio_of_filling = told_of.drag_beyond_per_mass, told_of.ratio_of_filling
+    UNLIKE, GAIN = "pore_impulse" in types.grid_fields, "filling_gain" in types.grid_fields
     POROSITY = effects.porosity_update
     BEYOND = "drag_beyond" in types.grid_fields
     free_velocity, keep = types.scheme.free_velocity, types.scheme.keep
@@ -102,9 +103,23 @@ def make_grid_momentum(types: SimpleNamespace, vectors: SimpleNamespace, module:
                         inverse = per_mass(mass, parameters)
                     old = wp.cw_mul(inverse, grid.velocity[i, j])
                     new = free_velocity(grid, i, j, inverse, gravity, time_step)
+                    if UNLIKE:
+                        if telling == 1 and ratio > F(0.0):
+                            # The liquid has of the pressure what the node's own porosity gives it, so that where
+                            # porosities meet it is at rest under hydrostatic pressure; the solid has the rest.
+                            all_of_it = solid_of(grid.pore_impulse[i, j])
+                            share = ratio / ratio_of_filling(told, parameters)
+                            exchange = share * all_of_it - liquid_of(grid.pore_impulse[i, j])
+                            new += wp.cw_mul(inverse, of_phases(-exchange, exchange))
                     if LIQUID_ALONE:
                         if TWO_PHASE:
                             grid.liquid_alone[i, j] = liquid_of(new)
+                        elif GAIN:
+                            fall = time_step * parameters.gravity
+                            filling = ratio_of_filling(grid.told[i, j] / mass, parameters)
+                            grid.filling_gain[i, j] = grid.filling_gain[i, j] / mass + filling * fall
+                            # Before the step: without the mixture's forces.
+                            grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass - fall
                         else:
                             grid.liquid_alone[i, j] = new + grid.liquid_alone[i, j] / mass
                     if MATERIALS:

@@ -257,6 +257,11 @@ def layout(effects: Effects) -> SimpleNamespace:
         # By how much each is more than it would be, were all of the flow's material: its points need not tell it.
         grid["told"] = array(dtype=types.M, ndim=2)
         grid["telling"] = array(dtype=wp.int32, ndim=2)  # 1 of the blocks in which somebody ever did
+        if effects.unlike_porosity:
+            # Impulse of the pressure in the step: all of it, and the liquid's share by each point's own porosity.
+            grid["pore_impulse"] = array(dtype=V, ndim=2)
+        if effects.liquid_alone and not effects.two_phase:
+            grid["filling_gain"] = array(dtype=X, ndim=2)  # what the liquid alone gains in the step, times its ratio
     if effects.porosity_update and "drag" not in told:
         grid["drag"] = array(dtype=scalar, ndim=2)  # drag coefficient over its value at the start, times mass
         if effects.inertial_drag and effects.conductivity != "constant":

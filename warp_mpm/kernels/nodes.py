@@ -23,6 +23,7 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
     DRAG, BEYOND, TOLD, PARTLY_DRY = (
         name in types.grid_fields for name in ("drag", "drag_beyond", "told", "corner_wet")
     )
+    UNLIKE, GAIN = "pore_impulse" in types.grid_fields, "filling_gain" in types.grid_fields
     NEXT_TO_NIL = next_to_nil(types)
     M = types.M
 
@@ -43,6 +44,10 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                         grid.told[i, bj * wp.static(BLOCK) + b] = M()
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
+                if UNLIKE:
+                    grid.pore_impulse[i, j] = V()
+                if GAIN:
+                    grid.filling_gain[i, j] = X()
                 grid.mass[i, j] = F(0.0)
                 grid.velocity[i, j] = V()
                 empty(grid, i, j)

@@ -83,6 +83,8 @@ def make_transfer(
     PARTLY_DRY = types.partly_dry
     DRY = PARTLY_DRY and not LIQUID  # in a scene that is wet elsewhere
     TOLD = "told" in types.grid_fields
+    GAIN = "filling_gain" in types.grid_fields
+    UNLIKE = "pore_impulse" in types.grid_fields and TWO_PHASE
     TOLD_DRAG = "drag" in types.told and POROSITY
     TOLD_BEYOND = "drag_beyond" in types.told
     DRAG_AT, BEYOND_AT = types.told.get("drag", 0), types.told.get("drag_beyond", 0)
@@ -255,6 +257,13 @@ def make_transfer(
                         grid, node, wy[m], dy[m], to_y[m], column_momentum, column_change, column_force, column_slope
                     )
 
+        if UNLIKE:
+            impulse = pressure * volume * parameters.inverse_spacing * time_step
+            for k in range(3):
+                for m in range(3):
+                    along = V2(impulse * dx[k] * wy[m], impulse * wx[k] * dy[m])
+                    add(grid.pore_impulse, first + k * parameters.rows + m, of_phases(along, n * along))
+
         if TOLD:
             if tells == 1:
                 for q in range(wp.static(LAYERS)):
@@ -295,12 +304,18 @@ def make_transfer(
                             rubbed = wp.bool(True)
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
-                alone = pressure * volume * parameters.inverse_spacing * time_step / parameters.filling_ratio
+                alone = pressure * volume * parameters.inverse_spacing * time_step
                 share = impulse_share(time_step)
-                along_x = on_x(alone) - share * solid_of(force_x)
-                along_y = on_y(alone) - share * solid_of(force_y)
-                if SPATIAL:
-                    along_z = on_z(alone) - share * solid_of(force_z)
+                if GAIN:
+                    # Nodes know its mass: here what takes the mixture's forces away.
+                    along_x = -share * solid_of(force_x)
+                    along_y = -share * solid_of(force_y)
+                else:
+                    alone /= parameters.filling_ratio
+                    along_x = on_x(alone) - share * solid_of(force_x)
+                    along_y = on_y(alone) - share * solid_of(force_y)
+                    if SPATIAL:
+                        along_z = on_z(alone) - share * solid_of(force_z)
                 for q in range(wp.static(LAYERS)):
                     for k in range(3):
                         for m in range(3):
@@ -310,6 +325,8 @@ def make_transfer(
                                 node += q * parameters.layer
                                 excess = wz[q] * excess + (dz[q] * wx[k] * wy[m]) * along_z
                             add(grid.liquid_alone, node, excess)
+                            if GAIN:
+                                add(grid.filling_gain, node, alone * V2(dx[k] * wy[m], wx[k] * dy[m]))
 
     @wp.kernel(module=module)
     def scatter(points: Points, grid: Grid, parameters: Parameters, bodies: Bodies, book: Book):

@@ -30,7 +30,7 @@ POINT_FIELDS: Mapping[str, Quantity] = {
         Quantity(
             "material",
             "-",
-            "place of its material, where a scene has several: 0 the flow's, then deposits' own",
+            "place of its material, where a scene has several: 0 the flow's, then deposits', then what arrives",
         ),
     )
 }

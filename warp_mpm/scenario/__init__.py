@@ -31,7 +31,7 @@ from warp_mpm.scenario.flow import (
     UndrainedMaterial,
 )
 from warp_mpm.scenario.ground import Ground, Stretch
-from warp_mpm.scenario.inflow import Inflow
+from warp_mpm.scenario.inflow import Inflow, Surge
 from warp_mpm.scenario.scene import Scenario, json_schema
 from warp_mpm.scenario.settings import STANDARD_GRAVITY, Domain, Gravity, Numerics, Output
 
@@ -61,6 +61,7 @@ __all__ = [
     "Sliding",
     "Stretch",
     "SurfaceFriction",
+    "Surge",
     "Trapezoid",
     "TwoPhaseFlow",
     "TwoPhaseMaterial",

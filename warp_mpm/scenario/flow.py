@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import math
 from functools import cache
-from typing import Annotated, Any, Literal, Self, Union
+from typing import Annotated, Any, Literal, NamedTuple, Self, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from pydantic import Field, create_model, model_validator
 
 from warp_mpm import geometry
 from warp_mpm.scenario.ground import Ground
-from warp_mpm.scenario.inflow import Inflow
+from warp_mpm.scenario.inflow import DENSITY_STEPS, Inflow
+from warp_mpm.scenario.other_material import OtherMaterial
 from warp_mpm.scenario.settings import STANDARD_GRAVITY
 from warp_mpm.scenario.velocity_profile import VelocityProfile
 from warp_mpm.scenario_errors import ScenarioError
@@ -157,20 +158,11 @@ class FlowOnGround(Model):
         return FlowPolygon(kind="polygon", vertices_m=outline.tolist())
 
 
-class Deposit(Model):
+class Deposit(OtherMaterial):
     """What lies there at the start: the deposit of an earlier surge."""
 
     shape: Annotated[FlowPolygon | FlowOnGround, Field(discriminator="kind")]
     """Its outline."""
-    lateral_stress_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    """K0 of its initial stress, which is geostatic, with the liquid hydrostatic; null: that of the flow, or of the law
-    where it has a `material`."""
-    formulation: Literal["two_phase", "undrained", "dry"] | None = None
-    """Whether its voids hold liquid, and whether that moves on its own; null: as in the flow. All that is wet in a
-    scene has one formulation."""
-    material: dict[str, Any] | None = None
-    """What its material has otherwise than flow.material, any of the fields of one of its law and formulation: `law`
-    with the fields of that law, densities, porosity, moduli, conductivity; null: nothing."""
 
     def laid_on(self, ground: Ground) -> Self:
         """The same deposit as a polygon over `ground`, where it is of the kind on_ground."""
@@ -334,6 +326,16 @@ class TwoPhaseMaterial(UndrainedMaterial):
         return self.hydraulic_conductivity * self.liquid_viscosity_Pa_s / weight
 
 
+def _of_density(material: Skeleton, density: float) -> Skeleton:
+    """The material with the porosity that makes its density [kg/m³], which lies between those of its parts."""
+    filling = getattr(material, "liquid_density_kg_per_m3", 0.0)
+    grains = material.grain_density_kg_per_m3
+    porosity = (grains - density) / (grains - filling)
+    if abs(porosity - material.porosity) < 1e-12:
+        return material
+    return material.model_copy(update={"porosity": porosity})
+
+
 COMMON = ("porosity_update", "conductivity_law")
 """Fields in which wet materials of one scene do not differ."""
 
@@ -343,6 +345,29 @@ def formulation_of(material: Skeleton) -> Literal["two_phase", "undrained", "dry
     if isinstance(material, TwoPhaseMaterial):
         return "two_phase"
     return "undrained" if isinstance(material, UndrainedMaterial) else "dry"
+
+
+class Arriving(NamedTuple):
+    """A part of what arrives that is of one material."""
+
+    begin: float
+    """Time [s] from which on it passes the section."""
+    end: float
+    """Until then [s]."""
+    density: float
+    """Of what passes then, that of which the density of the whole is next to this one [kg/m³]; nan: all of it."""
+    own: OtherMaterial
+    """What it says of its material."""
+    material: Skeleton
+
+
+def part_at(parts: list[Arriving], time: NDArray[np.float64], density: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Place among the parts of what passes at times [N] [s] with densities [N] [kg/m³]."""
+    apart = []
+    for part in parts:
+        beside = np.maximum(np.maximum(part.begin - time, time - part.end), 0.0)
+        apart.append(1e12 * beside + (0.0 if math.isnan(part.density) else np.abs(part.density - density)))
+    return np.argmin(apart, axis=0)
 
 
 class _FlowBase(VelocityProfile):
@@ -445,10 +470,14 @@ class _FlowBase(VelocityProfile):
     @model_validator(mode="after")
     def _other_materials(self) -> Self:
         wet = [] if formulation_of(self.material) == "dry" else [self.material]
-        for place, deposit in enumerate(self.deposits):
-            name = f"deposits[{place}].material"
+        bodies: list[tuple[str, OtherMaterial]] = [(f"deposits[{k}].", one) for k, one in enumerate(self.deposits)]
+        if self.inflow is not None:
+            bodies.append(("inflow.", self.inflow))
+            bodies += [(f"inflow.surges[{k}].", one) for k, one in enumerate(self.inflow.surges)]
+        for body, one in bodies:
+            name = f"{body}material"
             try:
-                own = self.material_of(deposit)
+                own = self.material_of(one)
             except ScenarioError as error:
                 raise ValueError(f"{name}: {error.problems[0].rstrip('.')}") from None
             except ValueError as error:
@@ -459,7 +488,7 @@ class _FlowBase(VelocityProfile):
             wet.append(own)
             if formulation != formulation_of(wet[0]):
                 raise ValueError(
-                    f'deposits[{place}].formulation = "{formulation}" is not allowed, as what is wet in a scene '
+                    f'{body}formulation = "{formulation}" is not allowed, as what is wet in a scene '
                     f'has one formulation; it must be "{formulation_of(wet[0])}" or "dry"'
                 )
             for field in COMMON:
@@ -471,21 +500,102 @@ class _FlowBase(VelocityProfile):
                     )
         return self
 
-    def material_of(self, deposit: Deposit) -> Skeleton:
-        """The material of a deposit: the flow's, but for what its own says. What is left out of another law's fields
+    @model_validator(mode="after")
+    def _what_arrives(self) -> Self:
+        inflow = self.inflow
+        if inflow is None:
+            return self
+        surges = self._surges(inflow)
+        if inflow.pore_pressure_ratios is not None and all(formulation_of(own) == "dry" for *_, own in surges):
+            raise ValueError(
+                "inflow.pore_pressure_ratios are not allowed, as all that arrives is dry and has no liquid; leave them "
+                "out"
+            )
+        if inflow.densities_kg_per_m3 is None:
+            return self
+        for begin, end, _, own in surges:
+            bounds = sorted([getattr(own, "liquid_density_kg_per_m3", 0.0), own.grain_density_kg_per_m3])
+            for place, density in enumerate(inflow.densities_kg_per_m3):
+                time, depth = inflow.times[place], inflow.depths[place]
+                nothing = depth == density == 0.0
+                if begin <= time <= end and not nothing and not bounds[0] < density < bounds[1]:
+                    raise ValueError(
+                        f"inflow.densities_kg_per_m3[{place}] = {density:g} is not allowed; it must be above "
+                        f"{bounds[0]:g} and below {bounds[1]:g}, the densities of what fills the voids and of grains"
+                    )
+        return self
+
+    def _surges(self, inflow: Inflow) -> list[tuple[float, float, OtherMaterial, Skeleton]]:
+        """Begin, end [s], what is said of the material and the material of each surge of an inflow."""
+        said: list[OtherMaterial] = [inflow, *inflow.surges]
+        begins = [-math.inf, *(surge.from_s for surge in inflow.surges)]
+        ends = [*begins[1:], math.inf]
+        return [(begin, end, own, self.material_of(own)) for begin, end, own in zip(begins, ends, said, strict=True)]
+
+    @property
+    def arriving(self) -> list[Arriving]:
+        """What arrives, by material, in the order in which each begins to.
+
+        A density that changes over time is one of the porosity: at equal volume some of the solid gives way to liquid,
+        or to air. It is cut into `DENSITY_STEPS` equal steps at most, each with the mean of what passes of it, so that
+        the mass is that of the table.
+        """
+        inflow, found = self.inflow, []
+        if inflow is None:
+            return []
+        times, volumes = inflow.passing
+        for begin, end, own, material in self._surges(inflow):
+            within = (times >= begin) & (times < end)
+            if not within.any():
+                continue
+            if inflow.densities_kg_per_m3 is None:
+                found.append(Arriving(begin, end, math.nan, own, material))
+                continue
+            density, volume = inflow.density(times[within]), volumes[within]
+            least, most = float(density.min()), float(density.max())
+            count = DENSITY_STEPS if most - least > 1e-9 * most else 1
+            middles = least + (most - least) * (np.arange(count) + 0.5) / count
+            steps = np.abs(middles[:, None] - density).argmin(axis=0)
+            for step in dict.fromkeys(steps.tolist()):
+                mean = float(np.average(density[steps == step], weights=volume[steps == step]))
+                found.append(Arriving(begin, end, float(middles[step]), own, _of_density(material, mean)))
+        return found
+
+    def arrived_volume(self, mass: float) -> float:
+        """Volume [m³/m] of so much mass [kg/m] of what arrives first."""
+        parts = self.arriving
+        if len(parts) == 1:
+            return mass / parts[0].material.density
+        volumes, masses = self._arriving_pieces(parts)
+        return float(np.interp(mass, np.append(0.0, np.cumsum(masses)), np.append(0.0, np.cumsum(volumes))))
+
+    @property
+    def arriving_mass(self) -> float:
+        """Mass of all that arrives [kg/m]."""
+        return float(self._arriving_pieces(self.arriving)[1].sum()) if self.inflow is not None else 0.0
+
+    def _arriving_pieces(self, parts: list[Arriving]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Volumes [L] [m³/m] and masses [L] [kg/m] of what arrives, one piece after the other."""
+        assert self.inflow is not None
+        times, volumes = self.inflow.passing
+        densities = np.array([part.material.density for part in parts])
+        return volumes, volumes * densities[part_at(parts, times, self.inflow.density(times))]
+
+    def material_of(self, body: OtherMaterial) -> Skeleton:
+        """The material of a body: the flow's, but for what its own says. What is left out of another law's fields
         has that law's defaults.
 
         Raises:
             ScenarioError: a field's value is not allowed, or one is missing.
             ValueError: there is no such field, or law.
         """
-        given = deposit.material or {}
-        if not given and deposit.formulation in (None, formulation_of(self.material)):
+        given = body.material or {}
+        if not given and body.formulation in (None, formulation_of(self.material)):
             return self.material
         law = given.get("law", self.material.law)
         if law not in LAWS.names:
             raise ValueError(f"law = {json.dumps(law)} is not known; it must be one of {', '.join(LAWS.names)}")
-        formulation = deposit.formulation or formulation_of(self.material)
+        formulation = body.formulation or formulation_of(self.material)
         kind = _with_law(_MATERIALS[_FLOWS[formulation]], LAWS.named(law))
         for field in given:
             if field not in kind.model_fields:
@@ -504,10 +614,9 @@ class _FlowBase(VelocityProfile):
 
     @property
     def materials(self) -> list[Skeleton]:
-        """All of the scene's, the flow's first, then those that are its deposits' own; equal ones once."""
+        """All of the scene's, the flow's first, then the deposits' own, then those of what arrives; equal ones once."""
         found = [self.material]
-        for deposit in self.deposits:
-            own = self.material_of(deposit)
+        for own in [*map(self.material_of, self.deposits), *(part.material for part in self.arriving)]:
             if own not in found:
                 found.append(own)
         return found
@@ -564,6 +673,14 @@ class _FlowBase(VelocityProfile):
         """Volume V_1 [m³/m] of all that flows, what arrives during the run included."""
         there = geometry.area(self.shape.polygon) if self.shape is not None else 0.0
         return there + self.inflow.volume if self.inflow is not None else there
+
+    @property
+    def mass(self) -> float:
+        """Mass of that [kg/m]."""
+        if all(part.material == self.material for part in self.arriving):
+            return self.volume * self.material.density
+        there = geometry.area(self.shape.polygon) if self.shape is not None else 0.0
+        return there * self.material.density + self.arriving_mass
 
     @property
     def deposited_volume(self) -> float:

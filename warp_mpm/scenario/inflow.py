@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from warp_mpm.scenario.ground import Ground
+from warp_mpm.scenario.other_material import OtherMaterial
 from warp_mpm.scenario.velocity_profile import VelocityProfile
-from warp_mpm.schema import Coordinate, Length, Series, Text
+from warp_mpm.schema import Coordinate, Length, NonNegative, Series, Text
 
 Array = NDArray[np.float64]
 
@@ -39,16 +40,32 @@ COLUMNS = {
     "velocities_m_per_s": ("velocity", "v", "u", "velocity_m_per_s", "speed", "flow_velocity", "fv"),
     "discharge": ("discharge", "q", "discharge_m3_per_s", "discharge_m2_per_s"),
     "pore_pressure_ratios": ("pore_pressure_ratio", "lambda_p"),
+    "densities_kg_per_m3": ("density", "rho", "density_kg_per_m3", "bulk_density", "flow_density"),
 }
 """Names of the columns of a hydrograph, in small letters, without their unit in brackets, and _ for a space."""
 
 
-class Inflow(VelocityProfile):
+DENSITY_STEPS = 8
+"""Materials at most that stand for a density that changes over time."""
+
+LARGEST = {"depths_m": 1e6, "velocities_m_per_s": 1e4, "pore_pressure_ratios": 1.0, "densities_kg_per_m3": 1e5}
+"""Greatest values of the columns of the table; the least is 0."""
+
+
+class Surge(OtherMaterial):
+    """What arrives from some time on, of a material of its own."""
+
+    from_s: NonNegative
+    """Time from which it passes the section."""
+
+
+class Inflow(VelocityProfile, OtherMaterial):
     """A flow that arrives at an upright section, in one surge or several.
 
-    Between the given times depth and velocity are linear; before the first and after the last nothing arrives, nor
-    where the depth is 0. What arrives has the flow's material and moves along the ground at the section, which is
-    straight for some cells before it; its stress is that of a flow at rest of its depth (`initial_stress`).
+    Between the given times depth, velocity and density are linear; before the first and after the last nothing arrives,
+    nor where the depth is 0. What arrives has the flow's material, but for what it says otherwise, and moves along the
+    ground at the section, which is straight for some cells before it; its stress is that of a flow at rest of its depth
+    (`initial_stress`).
     """
 
     x_m: Coordinate
@@ -65,6 +82,11 @@ class Inflow(VelocityProfile):
     """One velocity for all times, in place of velocities_m_per_s."""
     pore_pressure_ratios: Series | None = None
     """λ_p then, pore pressure over total vertical stress, 0 to 1; null: that of the flow."""
+    densities_kg_per_m3: Series | None = None
+    """Densities of the whole then, which the porosity makes, between those of liquid and grains; where the depth is 0
+    they may be 0: as next to it. null: that of the material."""
+    surges: Annotated[tuple[Surge, ...], Field(strict=False, max_length=20)] = ()
+    """What arrives from some times on is of other materials; before the first it is of this one."""
     hydrograph_csv: Text | None = None
     """File with the table, beside the scenario, in place of times_s and what belongs to them."""
     width_m: Length | None = None
@@ -99,13 +121,12 @@ class Inflow(VelocityProfile):
         count = len(self.times_s)
         if count < 2:
             raise ValueError(f"times_s has {count} entry; it must have at least 2")
-        for name in ("depths_m", "velocities_m_per_s", "pore_pressure_ratios"):
+        for name, largest in LARGEST.items():
             values = getattr(self, name)
             if values is None:
                 continue
             if len(values) != count:
                 raise ValueError(f"{name} has {len(values)} entries and times_s {count}; they must be as many")
-            largest = {"depths_m": 1e6, "velocities_m_per_s": 1e4, "pore_pressure_ratios": 1.0}[name]
             for place, value in enumerate(values):
                 if not 0.0 <= value <= largest:
                     raise ValueError(f"{name}[{place}] = {value:g} is not allowed; it must be from 0 to {largest:g}")
@@ -119,6 +140,14 @@ class Inflow(VelocityProfile):
             raise ValueError(f"times_s[0] = {self.times_s[0]:g} is not allowed; it must be at least 0")
         if not self.volume > 0.0:
             raise ValueError("brings nothing: depth or velocity is 0 at all times")
+        before = self.times_s[0]
+        for place, surge in enumerate(self.surges):
+            if not before < surge.from_s < self.times_s[-1]:
+                raise ValueError(
+                    f"surges[{place}].from_s = {surge.from_s:g} is not allowed; it must be above {before:g} and below "
+                    f"{self.times_s[-1]:g}, the last of times_s"
+                )
+            before = surge.from_s
         if self.velocity_profile is not None:
             paces = self.paces(np.array(self.velocity_profile)[:, 0])
             if paces.min() < LEAST_PACE * (1.0 - 1e-9):
@@ -248,6 +277,22 @@ class Inflow(VelocityProfile):
         )
         volume = np.concatenate([[0.0], np.cumsum(whole)])[k] + part
         return way, volume, h + share * rise
+
+    def density(self, time: Array) -> Array:
+        """Density of the whole of what passes at times [N] [s]; nan where the table has none [kg/m³]."""
+        if self.densities_kg_per_m3 is None:
+            return np.full(len(time), np.nan)
+        densities = np.array(self.densities_kg_per_m3)
+        there = densities > 0.0
+        return np.interp(time, self.times[there], densities[there])
+
+    @property
+    def passing(self) -> tuple[Array, Array]:
+        """All that passes in pieces, small beside the intervals of the table: times [L] [s], volumes [L] [m³/m]."""
+        shares = np.arange(PIECES) / PIECES
+        times = np.append((self.times[:-1, None] + np.diff(self.times)[:, None] * shares).ravel(), self.times[-1])
+        volumes = np.diff(self.profile[1])
+        return (0.5 * (times[1:] + times[:-1]))[volumes > 0.0], volumes[volumes > 0.0]
 
     @property
     def greatest_depth(self) -> float:
