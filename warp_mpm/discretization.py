@@ -24,6 +24,27 @@ TOUCHING = 1e-3
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
 
+EQUAL_WEIGHTS: dict[int, tuple[float, ...]] = {
+    2: (-math.sqrt(1 / 3), math.sqrt(1 / 3)),
+    3: (-math.sqrt(1 / 2), 0.0, math.sqrt(1 / 2)),
+    4: tuple(
+        sign * math.sqrt((1 + other * math.sqrt(4 / 5)) / 3) for sign, other in ((-1, 1), (-1, -1), (1, -1), (1, 1))
+    ),
+}
+"""Places in (-1, 1) whose mean is that of any polynomial of third degree (Chebyshev's quadrature), by their number."""
+
+TRIANGLE = np.array(
+    [
+        [1.0 - 2.0 * a if corner == k else a for corner in range(3)]
+        for a in (0.445948490915965, 0.091576213509771)
+        for k in range(3)
+    ]
+)
+"""Six places in a triangle, as shares of its corners, that integrate polynomials of fourth degree (Dunavant 1985)."""
+
+TRIANGLE_SHARES = np.repeat([0.223381589678011, 0.109951743655322], 3)
+"""What each of them stands for of the triangle's area."""
+
 
 class Span(NamedTuple):
     """Points of one material that follow each other, from `begin` to before `end`."""
@@ -145,28 +166,85 @@ def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int
     if not spacing > 0.0:
         raise ValueError(f"spacing = {spacing} must be greater than 0")
     polygon = geometry.anticlockwise(np.asarray(polygon, dtype=float))
+    if per_side > 1 and _lies_on_a_slope(polygon):
+        return _fill_exactly(polygon, spacing, per_side)
     side = spacing / per_side
+    shape, middles, cut = _squares(polygon, side)
+    volume = np.where(geometry.contains(polygon, middles), side * side, 0.0)
+    position = middles.copy()
+    for index in np.flatnonzero(cut):
+        part = _part_in_square(polygon, middles[index], side)
+        volume[index] = geometry.area(part)
+        if volume[index] > 0.0:
+            position[index] = geometry.centroid(part)
 
+    _join_slivers(volume, position, shape, np.flatnonzero(cut), SMALLEST_POINT * side * side)
+    filled = volume > 0.0
+    return position[filled], volume[filled]
+
+
+def _lies_on_a_slope(polygon: geometry.Polygon) -> bool:
+    """Whether an edge of an anticlockwise polygon looks down and is neither level nor upright, but for rounding."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    rounding = 1e-9 * np.abs(along).max(axis=1)
+    return bool(((along[:, 0] > rounding) & (np.abs(along[:, 1]) > rounding)).any())
+
+
+def _fill_exactly(polygon: geometry.Polygon, spacing: float, per_side: int) -> tuple[Array, Array]:
+    """Points that integrate over an anticlockwise polygon, cell by cell, what a flow at rest gives to the nodes.
+
+    In a cell, a spline of the nodes is of second degree in x and in y, and so is its slope times a pressure that is
+    linear, but for one degree more in one of them. A whole cell has `per_side`² points of equal volume, a part of a
+    cell six to each triangle of it.
+    """
+    _, middles, cut = _squares(polygon, spacing)
+    whole = geometry.contains(polygon, middles)
+    cells, positions, volumes = [], [], []
+    for index in np.flatnonzero(cut):
+        part = _part_in_square(polygon, middles[index], spacing)
+        share = geometry.area(part) / spacing**2
+        whole[index] = share > 1.0 - 1e-12
+        if share > 1e-14 and not whole[index]:
+            position, volume = _integrating(part)
+            cells.append(np.full(len(volume), index))
+            positions.append(position)
+            volumes.append(volume)
+    steps = 0.5 * spacing * np.array(EQUAL_WEIGHTS[per_side])
+    lattice = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells.append(np.repeat(np.flatnonzero(whole), per_side**2))
+    positions.append((middles[whole][:, None] + lattice).reshape(-1, 2))
+    volumes.append(np.full(len(cells[-1]), (spacing / per_side) ** 2))
+    order = np.argsort(np.concatenate(cells), kind="stable")
+    return np.concatenate(positions)[order], np.concatenate(volumes)[order]
+
+
+def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
+    """Points in a polygon that integrate polynomials of fourth degree over it; its centre alone where it is next to
+    nothing and rounding leaves no triangles."""
+    triangles = geometry.triangles(part)
+    position = (TRIANGLE @ triangles).reshape(-1, 2)
+    volume = np.multiply.outer([geometry.area(triangle) for triangle in triangles], TRIANGLE_SHARES).ravel()
+    area = geometry.area(part)
+    if abs(volume.sum() - area) > 1e-9 * area or not geometry.contains(part, position).all():
+        return geometry.centroid(part)[None], np.array([area])
+    return position, volume * (area / volume.sum())
+
+
+def _squares(polygon: geometry.Polygon, side: float) -> tuple[tuple[int, int], Array, NDArray[np.bool_]]:
+    """Columns and rows of the squares about a polygon, their middles [N, 2] and which of them its outline may cut."""
     low = np.floor(polygon.min(axis=0) / side).astype(np.int64)
     high = np.ceil(polygon.max(axis=0) / side).astype(np.int64)
     columns, rows = np.maximum(high - low, 1)
     middle_x = (low[0] + np.arange(columns) + 0.5) * side
     middle_y = (low[1] + np.arange(rows) + 0.5) * side
     middles = np.stack(np.meshgrid(middle_x, middle_y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return (int(columns), int(rows)), middles, _cut_squares(polygon, middles, side)
 
-    cut = _cut_squares(polygon, middles, side)
-    volume = np.where(geometry.contains(polygon, middles), side * side, 0.0)
-    position = middles.copy()
+
+def _part_in_square(polygon: geometry.Polygon, middle: Array, side: float) -> geometry.Polygon:
+    """What of a polygon lies in a square."""
     square = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    for index in np.flatnonzero(cut):
-        part = geometry.clip_convex(polygon, middles[index] + square)
-        volume[index] = geometry.area(part)
-        if volume[index] > 0.0:
-            position[index] = geometry.centroid(part)
-
-    _join_slivers(volume, position, (int(columns), int(rows)), np.flatnonzero(cut), SMALLEST_POINT * side * side)
-    filled = volume > 0.0
-    return position[filled], volume[filled]
+    return geometry.clip_convex(polygon, middle + square)
 
 
 def _cut_squares(polygon: geometry.Polygon, middles: Array, side: float) -> NDArray[np.bool_]:

@@ -10,6 +10,9 @@ from typing import Self
 
 from .outline import Outline
 
+PER_CELL = 2
+"""Points of contact per side of a cell, of any body but the ground."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -100,6 +103,8 @@ class Body:
     edge: bool = False
     """An edge of the domain: straight along the grid, and sets no point back. Its forces are in the balance of momentum
     but not recorded."""
+    places_per_cell: int = PER_CELL
+    """Points of contact per side of a cell, where the outline does not lie along the grid."""
 
     def __post_init__(self) -> None:
         if not self.surfaces:

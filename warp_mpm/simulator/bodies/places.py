@@ -5,7 +5,7 @@ weights, so that what it takes from the flow is what the flow takes from it.
 
 A piece of outline along a line of cell corners acts on mirrored pairs of nodes, of which the mean is the velocity at
 the surface itself, and on the nodes a row further back, one by one. Any other acts at points of the surface, with the
-splines' own weights, two to a cell.
+splines' own weights, `Body.places_per_cell` to a cell.
 
 Most pairs on level ground share no node with another place: each is done on its own. Where places share nodes, at an
 inclined face and in a corner, and where their body slides, they are joined: their impulses are found together.
@@ -27,9 +27,6 @@ from warp_mpm.kernels.layout import BLOCK
 from .body import Body, Driven, Sliding
 from .outline import ENDLESS, Array, Segments
 from .side import Side
-
-PER_CELL = 2.0
-"""Points of a surface per side of a cell."""
 
 SINGLE, DOUBLE = np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 0.0])
 """Weights of the middle node alone, and of a mirrored pair."""
@@ -223,7 +220,7 @@ def _points(
 ) -> Places:
     """Points of the pieces that do not lie along the grid."""
     pieces, spacing = body.outline.segments, grid.spacing
-    step = spacing / PER_CELL
+    step = spacing / body.places_per_cell
     low = np.array([grid.left, grid.bottom])
     high = low + spacing * np.array([grid.columns, grid.rows])
     reach = float((high - low).sum())
@@ -234,7 +231,7 @@ def _points(
         window = (middle - reach, middle + reach)
         stretches = [(float(pieces.low[k]), float(pieces.high[k]))]
         if not passing and others:
-            stretches = _free_stretches(pieces.begin[k], pieces.along[k], stretches[0], window, grid, others)
+            stretches = _free_stretches(pieces.begin[k], pieces.along[k], stretches[0], window, step, grid, others)
         for stretch in stretches:
             s, apart = _laid(stretch, window, step)
             at = pieces.begin[k] + s[:, None] * pieces.along[k]
@@ -281,6 +278,7 @@ def _free_stretches(
     along: Array,
     whole: tuple[float, float],
     window: tuple[float, float],
+    step: float,
     grid: GridLayout,
     others: Sequence[Body],
 ) -> list[tuple[float, float]]:
@@ -295,7 +293,7 @@ def _free_stretches(
     start, end = max(whole[0], window[0]), min(whole[1], window[1])
     if end <= start:
         return []
-    s = np.linspace(start, end, max(3, math.ceil(4.0 * PER_CELL * (end - start) / grid.spacing) + 1))
+    s = np.linspace(start, end, max(3, math.ceil(4.0 * (end - start) / step) + 1))
     is_free = free(s)
     turns = np.flatnonzero(is_free[1:] != is_free[:-1])
     occupied, open_ = np.where(is_free[turns], s[turns + 1], s[turns]), np.where(is_free[turns], s[turns], s[turns + 1])
