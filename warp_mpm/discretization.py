@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -33,17 +34,11 @@ EQUAL_WEIGHTS: dict[int, tuple[float, ...]] = {
 }
 """Places in (-1, 1) whose mean is that of any polynomial of third degree (Chebyshev's quadrature), by their number."""
 
-TRIANGLE = np.array(
-    [
-        [1.0 - 2.0 * a if corner == k else a for corner in range(3)]
-        for a in (0.445948490915965, 0.091576213509771)
-        for k in range(3)
-    ]
-)
-"""Six places in a triangle, as shares of its corners, that integrate polynomials of fourth degree (Dunavant 1985)."""
+ACROSS, ACROSS_SHARES = 0.5 + math.sqrt(3 / 20) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 18.0
+"""Three places in (0, 1) that integrate polynomials of fifth degree, and what each stands for (Gauss)."""
 
-TRIANGLE_SHARES = np.repeat([0.223381589678011, 0.109951743655322], 3)
-"""What each of them stands for of the triangle's area."""
+UPWARD = 0.5 + 0.5 * np.array(EQUAL_WEIGHTS[2])
+"""Two places in (0, 1) for those of third degree."""
 
 
 class Span(NamedTuple):
@@ -141,7 +136,9 @@ class _Part:
         return ratio * self.material.density
 
 
-def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
+def fill_polygon(
+    polygon: geometry.Polygon, spacing: float, points_per_cell: int, *, at_rest: bool = False
+) -> tuple[Array, Array]:
     """Material points that fill a polygon.
 
     A node of the background grid lies at the origin. Each cell is cut into `points_per_cell` equal squares, and every
@@ -149,10 +146,15 @@ def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int
     centroid of its part inside, with that part's volume; a part smaller than `SMALLEST_POINT` of a square is joined to
     its largest neighbour. Volume and centre of volume are therefore those of the polygon, to rounding.
 
+    What lies at rest on a slope, whose surface cuts the cells, must get from its points alone the forces that keep it
+    there: then mass, weight and the force of a hydrostatic pressure come to each node exactly, see `_fill_exactly`. One
+    point to a cell cannot do that.
+
     Args:
         polygon: simple polygon, vertices [V, 2] in metres.
         spacing: side of a grid cell [m].
         points_per_cell: a square number.
+        at_rest: whether what is filled is at rest.
 
     Returns:
         positions [N, 2] in metres and volumes [N] in m³/m, ordered by column and row.
@@ -166,7 +168,7 @@ def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int
     if not spacing > 0.0:
         raise ValueError(f"spacing = {spacing} must be greater than 0")
     polygon = geometry.anticlockwise(np.asarray(polygon, dtype=float))
-    if per_side > 1 and _lies_on_a_slope(polygon):
+    if at_rest and per_side > 1 and _lies_on_a_slope(polygon):
         return _fill_exactly(polygon, spacing, per_side)
     side = spacing / per_side
     shape, middles, cut = _squares(polygon, side)
@@ -195,7 +197,7 @@ def _fill_exactly(polygon: geometry.Polygon, spacing: float, per_side: int) -> t
 
     In a cell, a spline of the nodes is of second degree in x and in y, and so is its slope times a pressure that is
     linear, but for one degree more in one of them. A whole cell has `per_side`² points of equal volume, a part of a
-    cell six to each triangle of it.
+    cell six to each trapezoid of it.
     """
     _, middles, cut = _squares(polygon, spacing)
     whole = geometry.contains(polygon, middles)
@@ -215,19 +217,39 @@ def _fill_exactly(polygon: geometry.Polygon, spacing: float, per_side: int) -> t
     positions.append((middles[whole][:, None] + lattice).reshape(-1, 2))
     volumes.append(np.full(len(cells[-1]), (spacing / per_side) ** 2))
     order = np.argsort(np.concatenate(cells), kind="stable")
-    return np.concatenate(positions)[order], np.concatenate(volumes)[order]
+    position, volume = np.concatenate(positions)[order], np.concatenate(volumes)[order]
+    return position[volume > 0.0], volume[volume > 0.0]
 
 
 def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
-    """Points in a polygon that integrate polynomials of fourth degree over it; its centre alone where it is next to
-    nothing and rounding leaves no triangles."""
-    triangles = geometry.triangles(part)
-    position = (TRIANGLE @ triangles).reshape(-1, 2)
-    volume = np.multiply.outer([geometry.area(triangle) for triangle in triangles], TRIANGLE_SHARES).ravel()
-    area = geometry.area(part)
-    if abs(volume.sum() - area) > 1e-9 * area or not geometry.contains(part, position).all():
-        return geometry.centroid(part)[None], np.array([area])
-    return position, volume * (area / volume.sum())
+    """Points in a polygon that integrate polynomials of fourth degree over it: six to each of the trapezoids between
+    lines through its corners, upright or level, of which there are fewer."""
+    upright, level = _trapezoids(part), _trapezoids(part[:, ::-1])
+    turned = len(level) < len(upright)
+    x, low, high = np.moveaxis(np.array(level if turned else upright), 1, 0)[..., None]
+    across = x[:, 0] + (x[:, 1] - x[:, 0]) * ACROSS
+    begin = low[:, 0] + (low[:, 1] - low[:, 0]) * ACROSS
+    height = high[:, 0] + (high[:, 1] - high[:, 0]) * ACROSS - begin
+    position = np.stack(np.broadcast_arrays(across[..., None], begin[..., None] + height[..., None] * UPWARD), axis=-1)
+    volume = np.repeat((0.5 * (x[:, 1] - x[:, 0]) * ACROSS_SHARES * height).ravel(), len(UPWARD))
+    return position.reshape(-1, 2)[:, :: -1 if turned else 1], volume
+
+
+def _trapezoids(polygon: geometry.Polygon) -> list[tuple[tuple[float, float], ...]]:
+    """What makes up a polygon: x of each trapezoid's upright sides, y of its lower edge there, and of its upper one."""
+    found = []
+    begin, end = polygon, np.roll(polygon, -1, axis=0)
+    lines = np.unique(polygon[:, 0])
+    for left, right in pairwise(lines):
+        if right - left <= 1e-12 * (lines[-1] - lines[0]):
+            continue
+        middle = 0.5 * (left + right)
+        spans = (begin[:, 0] < middle) != (end[:, 0] < middle)
+        (x0, y0), (x1, y1) = begin[spans].T, end[spans].T
+        slope = (y1 - y0) / (x1 - x0)
+        edges = sorted(zip(y0 + slope * (left - x0), y0 + slope * (right - x0), strict=True), key=sum)
+        found += [((left, right), low, high) for low, high in zip(edges[::2], edges[1::2], strict=True)]
+    return found
 
 
 def _squares(polygon: geometry.Polygon, side: float) -> tuple[tuple[int, int], Array, NDArray[np.bool_]]:
@@ -386,7 +408,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     lateral = flow.lateral_stress_ratio
     if flow.shape is not None:
         outline = flow.shape.polygon
-        filled = _filled(scenario, outline)
+        filled = _filled(scenario, outline, at_rest=not any(flow.velocity_m_per_s))
         velocity = _velocity(scenario, outline, *filled[:3])
         parts.append(_Part(*filled, flow.pore_pressure_ratio, lateral, flow.material, velocity, outline))
     for deposit in flow.deposits:
@@ -395,7 +417,7 @@ def material_points(scenario: Scenario) -> MaterialPoints:
             other = deposit.material is not None or deposit.formulation is not None
             own = LAWS.named(material.law).lateral_stress_ratio(material) if other else lateral
         outline = deposit.shape.polygon
-        parts.append(_Part(*_filled(scenario, outline), lambda _: None, own, material, outline=outline))
+        parts.append(_Part(*_filled(scenario, outline, at_rest=True), lambda _: None, own, material, outline=outline))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
@@ -426,9 +448,10 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     )
 
 
-def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array, Array, Array]:
+def _filled(scenario: Scenario, outline: geometry.Polygon, *, at_rest: bool) -> tuple[Array, Array, Array, Array]:
     """Position, volume, depth below the surface and shared slope of the points of a body that is there at the start."""
-    position, volume = fill_polygon(outline, scenario.numerics.spacing_m, scenario.numerics.points_per_cell)
+    numerics = scenario.numerics
+    position, volume = fill_polygon(outline, numerics.spacing_m, numerics.points_per_cell, at_rest=at_rest)
     below = geometry.depth_below_surface(outline, position)
     return position, volume, below, _shared_slope(scenario, outline, position)
 

@@ -82,34 +82,6 @@ def clip_convex(polygon: Polygon, window: Polygon) -> Polygon:
     return polygon
 
 
-def triangles(polygon: Polygon) -> NDArray[np.float64]:
-    """Triangles [T, 3, 2] that make up a simple polygon: ears are cut off one by one. O(V³), for a few vertices.
-
-    What has no area but by rounding is left out.
-    """
-    left = list(anticlockwise(polygon))
-    rounding = 1e-12 * area(polygon)
-    found = []
-
-    def turns(a: Polygon, b: Polygon, c: Polygon) -> float:
-        return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-
-    while len(left) >= 3:
-        for k in range(len(left)):
-            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-            turn = turns(a, b, c)
-            others = (left[(k + step) % len(left)] for step in range(2, len(left) - 1))
-            if turn < -rounding or any(min(turns(a, b, p), turns(b, c, p), turns(c, a, p)) > 0.0 for p in others):
-                continue
-            if turn > rounding:
-                found.append([a, b, c])
-            del left[k]
-            break
-        else:
-            break  # what is left has no area but by rounding
-    return np.array(found).reshape(-1, 3, 2)
-
-
 def crossing_edges(polygon: Polygon) -> tuple[int, int] | None:
     """First pair of edges that cross or touch without being neighbours; None for a simple polygon.
 
