@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,7 +226,7 @@ def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
     lines through its corners, upright or level, of which there are fewer."""
     upright, level = _trapezoids(part), _trapezoids(part[:, ::-1])
     turned = len(level) < len(upright)
-    x, low, high = np.moveaxis(np.array(level if turned else upright), 1, 0)[..., None]
+    x, low, high = np.moveaxis(level if turned else upright, 1, 0)[..., None]
     across = x[:, 0] + (x[:, 1] - x[:, 0]) * ACROSS
     begin = low[:, 0] + (low[:, 1] - low[:, 0]) * ACROSS
     height = high[:, 0] + (high[:, 1] - high[:, 0]) * ACROSS - begin
@@ -235,9 +235,9 @@ def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
     return position.reshape(-1, 2)[:, :: -1 if turned else 1], volume
 
 
-def _trapezoids(polygon: geometry.Polygon) -> list[tuple[tuple[float, float], ...]]:
-    """What makes up a polygon: x of each trapezoid's upright sides, y of its lower edge there, and of its upper one."""
-    found = []
+def _trapezoids(polygon: geometry.Polygon) -> Array:
+    """Trapezoids [T, 3, 2] of a polygon: x of their upright sides, y of the lower edge there, y of the upper one."""
+    found: list[Any] = []
     begin, end = polygon, np.roll(polygon, -1, axis=0)
     lines = np.unique(polygon[:, 0])
     for left, right in pairwise(lines):
@@ -249,7 +249,7 @@ def _trapezoids(polygon: geometry.Polygon) -> list[tuple[tuple[float, float], ..
         slope = (y1 - y0) / (x1 - x0)
         edges = sorted(zip(y0 + slope * (left - x0), y0 + slope * (right - x0), strict=True), key=sum)
         found += [((left, right), low, high) for low, high in zip(edges[::2], edges[1::2], strict=True)]
-    return found
+    return np.array(found)
 
 
 def _squares(polygon: geometry.Polygon, side: float) -> tuple[tuple[int, int], Array, NDArray[np.bool_]]:

@@ -10,9 +10,6 @@ from typing import Self
 
 from .outline import Outline
 
-PER_CELL = 2
-"""Points of contact per side of a cell, of any body but the ground."""
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -103,8 +100,8 @@ class Body:
     edge: bool = False
     """An edge of the domain: straight along the grid, and sets no point back. Its forces are in the balance of momentum
     but not recorded."""
-    places_per_cell: int = PER_CELL
-    """Points of contact per side of a cell, where the outline does not lie along the grid."""
+    dense_corners: bool = False
+    """Whether points of contact lie closer at the corners of the outline, so that what is at rest there stays so."""
 
     def __post_init__(self) -> None:
         if not self.surfaces:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from warp_mpm.scenario import Prescribed, Scenario, Trapezoid
 
-from .body import PER_CELL, Body
+from .body import Body
 from .of_scene import BARRIER
 from .outline import Segments
-from .places import Places
+from .places import PER_CELL, Places
 
 Array = NDArray[np.float64]
 

@@ -21,10 +21,6 @@ GROUND = "ground"
 BENEATH = 8.0
 """Cells below the lowest ground to which barriers go down that stand on a profile: no point gets there."""
 
-PER_CELL_OF_PROFILE = 3
-"""Points of contact of a profile per side of a cell. What a pond at rest gives to the nodes in a corner of its basin
-cannot be borne whole with two, and drives a current along the ground; with three it can."""
-
 
 def scene_bodies(scenario: Scenario, grid: GridLayout) -> list[Body]:
     """Ground, side walls, ceiling and barriers of `scenario`, those that it has."""
@@ -60,7 +56,7 @@ def ground_body(ground: Ground, weight: float = 0.0) -> Body:
         Surface(name, friction, tuple(int(piece) for piece in np.flatnonzero(stretch == number)), weight * drag)
         for number, (name, (_, friction), drag) in enumerate(zip(names, ground.frictions, ground.drags, strict=True))
     ]
-    return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces), places_per_cell=PER_CELL_OF_PROFILE)
+    return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces), dense_corners=True)
 
 
 def barrier_bodies(scenario: Scenario) -> list[Body]:
