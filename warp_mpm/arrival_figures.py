@@ -47,7 +47,7 @@ def lain_beyond(scenario: Scenario, place: float) -> float:
     for deposit in scenario.flow.deposits:
         outline = deposit.shape.polygon
         if outline[:, 0].max() > place:
-            position, parts = fill_polygon(outline, numerics.spacing_m, numerics.points_per_cell)
+            position, parts = fill_polygon(outline, numerics.spacing_m, numerics.points_per_cell, at_rest=True)
             volume += float(parts @ (position[:, 0] > place))
     return volume
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,21 @@ TOUCHING = 1e-3
 
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
+
+EQUAL_WEIGHTS: dict[int, tuple[float, ...]] = {
+    2: (-math.sqrt(1 / 3), math.sqrt(1 / 3)),
+    3: (-math.sqrt(1 / 2), 0.0, math.sqrt(1 / 2)),
+    4: tuple(
+        sign * math.sqrt((1 + other * math.sqrt(4 / 5)) / 3) for sign, other in ((-1, 1), (-1, -1), (1, -1), (1, 1))
+    ),
+}
+"""Places in (-1, 1) whose mean is that of any polynomial of third degree (Chebyshev's quadrature), by their number."""
+
+ACROSS, ACROSS_SHARES = 0.5 + math.sqrt(3 / 20) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 18.0
+"""Three places in (0, 1) that integrate polynomials of fifth degree, and what each stands for (Gauss)."""
+
+UPWARD = 0.5 + 0.5 * np.array(EQUAL_WEIGHTS[2])
+"""Two places in (0, 1) for those of third degree."""
 
 
 class Span(NamedTuple):
@@ -121,7 +137,9 @@ class _Part:
         return ratio * self.material.density
 
 
-def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int) -> tuple[Array, Array]:
+def fill_polygon(
+    polygon: geometry.Polygon, spacing: float, points_per_cell: int, *, at_rest: bool = False
+) -> tuple[Array, Array]:
     """Material points that fill a polygon.
 
     A node of the background grid lies at the origin. Each cell is cut into `points_per_cell` equal squares, and every
@@ -129,10 +147,15 @@ def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int
     centroid of its part inside, with that part's volume; a part smaller than `SMALLEST_POINT` of a square is joined to
     its largest neighbour. Volume and centre of volume are therefore those of the polygon, to rounding.
 
+    What lies at rest on a slope, whose surface cuts the cells, must get from its points alone the forces that keep it
+    there: then mass, weight and the force of a hydrostatic pressure come to each node exactly, see `_fill_exactly`. One
+    point to a cell cannot do that.
+
     Args:
         polygon: simple polygon, vertices [V, 2] in metres.
         spacing: side of a grid cell [m].
         points_per_cell: a square number.
+        at_rest: whether what is filled is at rest.
 
     Returns:
         positions [N, 2] in metres and volumes [N] in m³/m, ordered by column and row.
@@ -146,28 +169,105 @@ def fill_polygon(polygon: geometry.Polygon, spacing: float, points_per_cell: int
     if not spacing > 0.0:
         raise ValueError(f"spacing = {spacing} must be greater than 0")
     polygon = geometry.anticlockwise(np.asarray(polygon, dtype=float))
+    if at_rest and per_side > 1 and _lies_on_a_slope(polygon):
+        return _fill_exactly(polygon, spacing, per_side)
     side = spacing / per_side
+    shape, middles, cut = _squares(polygon, side)
+    volume = np.where(geometry.contains(polygon, middles), side * side, 0.0)
+    position = middles.copy()
+    for index in np.flatnonzero(cut):
+        part = _part_in_square(polygon, middles[index], side)
+        volume[index] = geometry.area(part)
+        if volume[index] > 0.0:
+            position[index] = geometry.centroid(part)
 
+    _join_slivers(volume, position, shape, np.flatnonzero(cut), SMALLEST_POINT * side * side)
+    filled = volume > 0.0
+    return position[filled], volume[filled]
+
+
+def _lies_on_a_slope(polygon: geometry.Polygon) -> bool:
+    """Whether an edge of an anticlockwise polygon looks down and is neither level nor upright, but for rounding."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    rounding = 1e-9 * np.abs(along).max(axis=1)
+    return bool(((along[:, 0] > rounding) & (np.abs(along[:, 1]) > rounding)).any())
+
+
+def _fill_exactly(polygon: geometry.Polygon, spacing: float, per_side: int) -> tuple[Array, Array]:
+    """Points that integrate over an anticlockwise polygon, cell by cell, what a flow at rest gives to the nodes.
+
+    In a cell, a spline of the nodes is of second degree in x and in y, and so is its slope times a pressure that is
+    linear, but for one degree more in one of them. A whole cell has `per_side`² points of equal volume, a part of a
+    cell six to each trapezoid of it.
+    """
+    _, middles, cut = _squares(polygon, spacing)
+    whole = geometry.contains(polygon, middles)
+    cells, positions, volumes = [], [], []
+    for index in np.flatnonzero(cut):
+        part = _part_in_square(polygon, middles[index], spacing)
+        share = geometry.area(part) / spacing**2
+        whole[index] = share > 1.0 - 1e-12
+        if share > 1e-14 and not whole[index]:
+            position, volume = _integrating(part)
+            cells.append(np.full(len(volume), index))
+            positions.append(position)
+            volumes.append(volume)
+    steps = 0.5 * spacing * np.array(EQUAL_WEIGHTS[per_side])
+    lattice = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells.append(np.repeat(np.flatnonzero(whole), per_side**2))
+    positions.append((middles[whole][:, None] + lattice).reshape(-1, 2))
+    volumes.append(np.full(len(cells[-1]), (spacing / per_side) ** 2))
+    order = np.argsort(np.concatenate(cells), kind="stable")
+    position, volume = np.concatenate(positions)[order], np.concatenate(volumes)[order]
+    return position[volume > 0.0], volume[volume > 0.0]
+
+
+def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
+    """Points in a polygon that integrate polynomials of fourth degree over it: six to each of the trapezoids between
+    lines through its corners, upright or level, of which there are fewer."""
+    upright, level = _trapezoids(part), _trapezoids(part[:, ::-1])
+    turned = len(level) < len(upright)
+    x, low, high = np.moveaxis(level if turned else upright, 1, 0)[..., None]
+    across = x[:, 0] + (x[:, 1] - x[:, 0]) * ACROSS
+    begin = low[:, 0] + (low[:, 1] - low[:, 0]) * ACROSS
+    height = high[:, 0] + (high[:, 1] - high[:, 0]) * ACROSS - begin
+    position = np.stack(np.broadcast_arrays(across[..., None], begin[..., None] + height[..., None] * UPWARD), axis=-1)
+    volume = np.repeat((0.5 * (x[:, 1] - x[:, 0]) * ACROSS_SHARES * height).ravel(), len(UPWARD))
+    return position.reshape(-1, 2)[:, :: -1 if turned else 1], volume
+
+
+def _trapezoids(polygon: geometry.Polygon) -> Array:
+    """Trapezoids [T, 3, 2] of a polygon: x of their upright sides, y of the lower edge there, y of the upper one."""
+    found: list[Any] = []
+    begin, end = polygon, np.roll(polygon, -1, axis=0)
+    lines = np.unique(polygon[:, 0])
+    for left, right in pairwise(lines):
+        if right - left <= 1e-12 * (lines[-1] - lines[0]):
+            continue
+        middle = 0.5 * (left + right)
+        spans = (begin[:, 0] < middle) != (end[:, 0] < middle)
+        (x0, y0), (x1, y1) = begin[spans].T, end[spans].T
+        slope = (y1 - y0) / (x1 - x0)
+        edges = sorted(zip(y0 + slope * (left - x0), y0 + slope * (right - x0), strict=True), key=sum)
+        found += [((left, right), low, high) for low, high in zip(edges[::2], edges[1::2], strict=True)]
+    return np.array(found)
+
+
+def _squares(polygon: geometry.Polygon, side: float) -> tuple[tuple[int, int], Array, NDArray[np.bool_]]:
+    """Columns and rows of the squares about a polygon, their middles [N, 2] and which of them its outline may cut."""
     low = np.floor(polygon.min(axis=0) / side).astype(np.int64)
     high = np.ceil(polygon.max(axis=0) / side).astype(np.int64)
     columns, rows = np.maximum(high - low, 1)
     middle_x = (low[0] + np.arange(columns) + 0.5) * side
     middle_y = (low[1] + np.arange(rows) + 0.5) * side
     middles = np.stack(np.meshgrid(middle_x, middle_y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return (int(columns), int(rows)), middles, _cut_squares(polygon, middles, side)
 
-    cut = _cut_squares(polygon, middles, side)
-    volume = np.where(geometry.contains(polygon, middles), side * side, 0.0)
-    position = middles.copy()
+
+def _part_in_square(polygon: geometry.Polygon, middle: Array, side: float) -> geometry.Polygon:
+    """What of a polygon lies in a square."""
     square = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    for index in np.flatnonzero(cut):
-        part = geometry.clip_convex(polygon, middles[index] + square)
-        volume[index] = geometry.area(part)
-        if volume[index] > 0.0:
-            position[index] = geometry.centroid(part)
-
-    _join_slivers(volume, position, (int(columns), int(rows)), np.flatnonzero(cut), SMALLEST_POINT * side * side)
-    filled = volume > 0.0
-    return position[filled], volume[filled]
+    return geometry.clip_convex(polygon, middle + square)
 
 
 def _cut_squares(polygon: geometry.Polygon, middles: Array, side: float) -> NDArray[np.bool_]:
@@ -305,13 +405,14 @@ def material_points(scenario: Scenario) -> MaterialPoints:
     lateral = flow.lateral_stress_ratio
     if flow.shape is not None:
         outline = flow.shape.polygon
-        filled = _filled(scenario, outline)
+        filled = _filled(scenario, outline, at_rest=not any(flow.velocity_m_per_s))
         velocity = _velocity(scenario, outline, *filled[:3])
         parts.append(_Part(*filled, flow.pore_pressure_ratio, lateral, flow.material, velocity, outline))
     for deposit in flow.deposits:
         material, outline = flow.material_of(deposit), deposit.shape.polygon
         own = _lateral(scenario, deposit, material)
-        parts.append(_Part(*_filled(scenario, outline), lambda _: None, own, material, outline=outline))
+        filled = _filled(scenario, outline, at_rest=True)
+        parts.append(_Part(*filled, lambda _: None, own, material, outline=outline))
     there = sum(len(part.volume) for part in parts)
     entry, pace = np.full(there, -math.inf), np.zeros(there)
     if flow.inflow is not None:
@@ -369,9 +470,10 @@ def _alike(ratio: float | Array | None) -> Callable[[Array], float | Array | Non
     return lambda _: ratio
 
 
-def _filled(scenario: Scenario, outline: geometry.Polygon) -> tuple[Array, Array, Array, Array]:
+def _filled(scenario: Scenario, outline: geometry.Polygon, *, at_rest: bool) -> tuple[Array, Array, Array, Array]:
     """Position, volume, depth below the surface and shared slope of the points of a body that is there at the start."""
-    position, volume = fill_polygon(outline, scenario.numerics.spacing_m, scenario.numerics.points_per_cell)
+    numerics = scenario.numerics
+    position, volume = fill_polygon(outline, numerics.spacing_m, numerics.points_per_cell, at_rest=at_rest)
     below = geometry.depth_below_surface(outline, position)
     return position, volume, below, _shared_slope(scenario, outline, position)
 

@@ -47,10 +47,51 @@ def test_volume_of_any_star(angles, radii, spacing):
     polygon = np.stack([np.cos(angles), np.sin(angles)], axis=1) * np.array(radii[: len(angles)])[:, None]
     if geometry.crossing_edges(polygon) is not None or geometry.area(polygon) < 1e-3:
         return
-    position, volume = fill_polygon(polygon, spacing, 4)
-    assert (volume > 0).all()
-    assert volume.sum() == pytest.approx(geometry.area(polygon), rel=1e-10)
-    assert volume @ position / volume.sum() == pytest.approx(geometry.centroid(polygon), abs=1e-9)
+    for at_rest in (False, True):
+        position, volume = fill_polygon(polygon, spacing, 4, at_rest=at_rest)
+        assert (volume > 0).all()
+        assert volume.sum() == pytest.approx(geometry.area(polygon), rel=1e-10)
+        assert volume @ position / volume.sum() == pytest.approx(geometry.centroid(polygon), abs=1e-9)
+
+
+BASIN = np.array([[-2.0, 1.5], [-1.3, 0.2], [-0.6, 0.1], [0.4, 0.65], [1.1, 0.3], [1.9, 1.5]])
+"""An underside with corners of both kinds, off the cells' corners; level on top."""
+
+
+def to_nodes(position, volume, spacing, at_top):
+    """Mass, and force of a pressure that grows from the surface down, of points [N] at the nodes [N, N, 3]."""
+    nodes = np.arange(-3.5, 20.5) * spacing - 3.0
+
+    def spline(x):
+        away = (x[:, None] - nodes) / spacing
+        near, slope = np.abs(away) < 0.5, np.clip(1.5 - np.abs(away), 0.0, None)
+        return (np.where(near, 0.75 - away**2, 0.5 * slope**2), np.where(near, -2.0 * away, -np.sign(away) * slope))
+
+    (wx, dx), (wy, dy) = map(spline, position.T)
+    force = volume * (at_top - position[:, 1])
+    along = ((wx, wy, volume), (dx, wy, force / spacing), (wx, dy, force / spacing))
+    return np.stack([np.einsum("pi,pj,p->ij", a, b, c) for a, b, c in along], axis=-1)
+
+
+@pytest.mark.parametrize("points_per_cell", [4, 9, 16])
+def test_what_lies_at_rest_on_a_slope_is_in_balance_at_every_node(points_per_cell):
+    spacing = 0.25
+    exact = to_nodes(*fill_polygon(BASIN, spacing / 4, 16, at_rest=True), spacing, 1.5)
+    position, volume = fill_polygon(BASIN, spacing, points_per_cell, at_rest=True)
+    assert geometry.contains(BASIN, position).all()
+    np.testing.assert_allclose(to_nodes(position, volume, spacing, 1.5), exact, atol=1e-12)
+    moving = to_nodes(*fill_polygon(BASIN, spacing, points_per_cell), spacing, 1.5)
+    assert np.abs(moving - exact).max() > 1e-4
+
+
+@pytest.mark.parametrize("shape", ["front_and_tail", "block"])
+def test_what_lies_on_level_ground_is_filled_as_what_moves_there(shape):
+    outline = {
+        "front_and_tail": geometry.front_and_tail(3.0, 3, 3.1),
+        "block": np.array([[0.1, 0.0], [2.3, 1e-15], [2.3, 1.1], [0.1, 1.1]]),
+    }[shape]
+    for ours, theirs in zip(fill_polygon(outline, 0.2, 4, at_rest=True), fill_polygon(outline, 0.2, 4), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
 
 
 def test_a_flow_thinner_than_a_square_keeps_its_mass():

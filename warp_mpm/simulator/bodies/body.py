@@ -100,6 +100,8 @@ class Body:
     edge: bool = False
     """An edge of the domain: straight along the grid, and sets no point back. Its forces are in the balance of momentum
     but not recorded."""
+    dense_corners: bool = False
+    """Whether points of contact lie closer at the corners of the outline, so that what is at rest there stays so."""
 
     def __post_init__(self) -> None:
         if not self.surfaces:

@@ -56,7 +56,7 @@ def ground_body(ground: Ground, weight: float = 0.0) -> Body:
         Surface(name, friction, tuple(int(piece) for piece in np.flatnonzero(stretch == number)), weight * drag)
         for number, (name, (_, friction), drag) in enumerate(zip(names, ground.frictions, ground.drags, strict=True))
     ]
-    return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces))
+    return Body(GROUND, Outline(vertices, closed=False), tuple(surfaces), dense_corners=True)
 
 
 def barrier_bodies(scenario: Scenario) -> list[Body]:

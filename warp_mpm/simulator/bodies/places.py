@@ -5,7 +5,7 @@ weights, so that what it takes from the flow is what the flow takes from it.
 
 A piece of outline along a line of cell corners acts on mirrored pairs of nodes, of which the mean is the velocity at
 the surface itself, and on the nodes a row further back, one by one. Any other acts at points of the surface, with the
-splines' own weights, two to a cell.
+splines' own weights, two to a cell; where `Body.dense_corners` says so, three to a cell next to a corner.
 
 Most pairs on level ground share no node with another place: each is done on its own. Where places share nodes, at an
 inclined face and in a corner, and where their body slides, they are joined: their impulses are found together.
@@ -30,6 +30,13 @@ from .side import Side
 
 PER_CELL = 2.0
 """Points of a surface per side of a cell."""
+
+PER_CELL_AT_CORNERS = 3.0
+"""The same next to a corner of an outline that has them closer there. What a fluid at rest gives to the nodes of a
+corner cannot be borne whole by two, and drives a current along the surface; by three it can."""
+
+NEXT_TO_CORNERS = 2.0
+"""Cells on either side of such a corner."""
 
 SINGLE, DOUBLE = np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 0.0])
 """Weights of the middle node alone, and of a mirrored pair."""
@@ -235,6 +242,8 @@ def _points(
             stretches = _free_stretches(pieces.begin[k], pieces.along[k], stretches[0], window, grid, others)
         for stretch in stretches:
             s, apart = _laid(stretch, window, step)
+            if body.dense_corners:
+                s, apart = _closer(s, apart, stretch, spacing)
             at = pieces.begin[k] + s[:, None] * pieces.along[k]
             near = ((at > low + 2.0 * spacing) & (at < high - 2.0 * spacing)).all(axis=1)
             if passing:
@@ -242,7 +251,7 @@ def _points(
                 near = (at[:, 1] > low[1] + 2.0 * spacing) & (at[:, 1] < high[1] - 2.0 * spacing) | (not sideways)
             position.append(at[near])
             piece.append(np.full(int(near.sum()), k, dtype=np.int32))
-            length.append(np.full(int(near.sum()), apart))
+            length.append(apart[near])
     places, of = np.concatenate(position), np.concatenate(piece)
     count = len(of)
     return Places(
@@ -258,20 +267,42 @@ def _points(
     )
 
 
-def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> tuple[NDArray[Any], float]:
-    """Places along a piece, and how far apart: a step, the first and last half of that from its ends; within the window
-    where it has none."""
+def _laid(stretch: tuple[float, float], window: tuple[float, float], step: float) -> tuple[NDArray[Any], Array]:
+    """Places along a piece, and the length for which each stands: a step, the first and last half of that from its
+    ends; within the window where it has none."""
     start, end = stretch
     begins, stops = start > -ENDLESS, end < ENDLESS
     length = (end if stops else window[1]) - (start if begins else window[0])
     if length <= 0.0:
-        return np.zeros(0), step
+        return np.zeros(0), np.zeros(0)
     count = max(1, math.ceil(length / step - 1e-9))
     apart = length / count if begins and stops else step
     places: NDArray[Any] = (np.arange(count) + 0.5) * apart
+    lengths = np.full(count, apart)
     if begins:
-        return start + places, apart
-    return ((end - places)[::-1] if stops else window[0] + places), apart
+        return start + places, lengths
+    return ((end - places)[::-1] if stops else window[0] + places), lengths
+
+
+def _closer(
+    places: NDArray[Any], lengths: Array, stretch: tuple[float, float], spacing: float
+) -> tuple[NDArray[Any], Array]:
+    """The same, divided as `PER_CELL_AT_CORNERS` says next to the ends of the piece."""
+    if len(places) == 0:
+        return places, lengths
+    edges = np.append(places - 0.5 * lengths, places[-1] + 0.5 * lengths[-1])
+    at_corner = np.zeros(len(places), dtype=bool)
+    for end in stretch:
+        at_corner |= np.abs(places - end) < NEXT_TO_CORNERS * spacing
+    parts = []
+    for group in np.split(np.arange(len(places)), np.flatnonzero(np.diff(at_corner)) + 1):
+        begin, end = edges[group[0]], edges[group[-1] + 1]
+        count = len(group)
+        if at_corner[group[0]]:
+            count = math.ceil((end - begin) * PER_CELL_AT_CORNERS / spacing - 1e-9)
+        parts.append(np.linspace(begin, end, count + 1)[:-1])
+    edges = np.append(np.concatenate(parts), edges[-1])
+    return 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
 
 
 def _free_stretches(
