@@ -350,11 +350,12 @@ def debris_flume(given: Given) -> Outcome:
         others += [Setting(start="hydrostatic", internal=SHEARED_AS_MEASURED)]
         others += [Setting(start="hydrostatic", internal=SHEARED_AS_MEASURED, smooth_ends=True)]
     words = (
-        "The bed is the flume's: 82.5 m at 31°, an arc of 10 m radius, a pad of 2.5°. The flume is 2 m wide; beside "
-        "its pad there are no walls, and the experiments spread where a plane flow cannot. Depth is volume over area "
-        "of half a metre of bed; stress and pore pressure are means over the lowest cell of it. The skeleton is soft "
-        "(E = 100 kPa), as the published compressibility makes it under some kilopascals. The internal friction is "
-        "that of the bed; without dilatancy it shears at sin φ' of the normal stress, so that the material slips in"
+        "In the pictures SG is the band that comes first at 32 m, SGM at 66 and 90 m. The bed is the flume's: 82.5 m "
+        "at 31°, an arc of 10 m radius, a pad of 2.5°. The flume is 2 m wide; beside its pad there are no walls, and "
+        "the experiments spread where a plane flow cannot. Depth is volume over area of half a metre of bed; stress "
+        "and pore pressure are means over the lowest cell of it. The skeleton is soft (E = 100 kPa), as the published "
+        "compressibility makes it under some kilopascals. The internal friction is that of the bed; without dilatancy "
+        "it shears at sin φ' of the normal stress, so that the material slips in "
         f"its lowest cells before the bed does: φ' = {SHEARED_AS_MEASURED:g}°, whose sine is tan 40.7°, has it slide "
         "on the bed as the friction was measured. The hopper's back is open, its load is 4.95 m² per metre of width. "
         "The side walls do not rub: with half of the weight across, a friction of 0.5 and 0.15 m of depth they would "
@@ -396,9 +397,10 @@ def debris_flume_dilatancy(given: Given) -> Outcome:
         others += [Setting(start="hydrostatic", mu_i=True), Setting(start="liquefied", mu_i=True)]
         others += [Setting(start="hydrostatic", critical=0.64, mu_i=True)]
     words = (
-        "Bed, gauges and skeleton are those of the case before. The row of m_crit = 0.63 is the setting of the "
-        "published script of these experiments, with 31° where the bed has no bumps. The doors of the hopper, gone at "
-        "once here, opened over 0.74 to 0.77 s; over their angle as published, the part of the width that they close "
+        "Bed, gauges and skeleton are those of the case before. In the pictures SG is the band that comes first at 32 "
+        "m, SGM at 66 and 90 m. The row of m_crit = 0.63 is the setting of the published script of these experiments, "
+        "with 31° where the bed has no bumps. The doors of the hopper, gone at once here, opened over 0.74 to 0.77 s; "
+        "over their angle as published, the part of the width that they close "
         f"adds up to {DOORS:g} s."
     )
     title = "Every run of the published ranges, and of μ(I)"
@@ -521,5 +523,5 @@ def _panels(runs: Sequence[Passed], spacings: Sequence[float], given: Given) -> 
             values = {"depth": run.depth, "stress on the bed": run.stress}.get(name, run.pressure)
             curves.append(Curve(run.time, factor * values[:, PLACES.index(place)], f"{spacing:g} m"))
         end = ARRIVALS["SG", place] + 6.0
-        panels.append(Panel(f"{name} at {place:g} m", "t [s]", unit, curves, bands=bands, x_range=(2.0, end)))
+        panels.append(Panel(f"{name} at {place:g} m", "t [s]", unit, curves, bands=bands, x_range=(0.0, end)))
     return panels
