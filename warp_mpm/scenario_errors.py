@@ -239,6 +239,8 @@ def _range_of(annotation: Any, prefix: str = "") -> str:
         many = Ellipsis in arguments
         item = _bare(arguments[0])
         things = "numbers" if item is float else "texts" if item is str else "pairs of numbers [x, y]"
+        if _is_model(item):
+            things = f"groups of the fields {', '.join(item.model_fields)}"
         least = next((c.min_length for c in constraints if isinstance(c, MinLen)), 0)
         most = next((c.max_length for c in constraints if isinstance(c, MaxLen)), None)
         count = f"{least} to {most} " if many and most else "" if many else f"{len(arguments)} "

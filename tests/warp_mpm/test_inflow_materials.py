@@ -189,6 +189,11 @@ def test_a_density_that_changes_closes_the_ledger():
             'flow: inflow.formulation = "undrained" is not allowed, as what is wet in a scene has one formulation; it '
             'must be "two_phase" or "dry"',
         ),
+        (
+            {"surges": {"from_s": 1.0}},
+            "surges = .* is not allowed; it must be a list of 0 to 20 groups of the fields lateral_stress_coefficient, "
+            "formulation, material, from_s",
+        ),
         ({"surges": [{"from_s": 2.0}]}, r"surges\[0\].from_s = 2 is not allowed; it must be above 0 and below 2"),
         (
             {"surges": [{"from_s": 1.0, "material": {"law": "fog"}}]},
