@@ -13,6 +13,8 @@ KNOWN_SHORT = {
     "collapse": ("a = 0.5: run-out", "a = 4: run-out"),
     # Grains of a millimetre shear too slowly for their friction to grow: the tallest column runs 13 % too far.
     "collapse-by-rate": ("beads of 1 mm, a = 4: run-out",),
+    # Points drawn out into rows count room that is not there: the corner holds up to twice what it can.
+    "corner": ("filling of the corner", "pressure in the corner"),
     # The roller breaks again and again, so that the place of the front is uncertain by a depth: 13 % too fast.
     "bore": ("speed of the bore",),
     # Quadrature of the stress in cells that the face cuts; 16 points per cell leave a fourth.
@@ -41,6 +43,10 @@ WORST = {
     "beads of 1 mm, a = 4: run-out": 0.15,
     "speed of the bore": 0.15,
     "run-out": 0.05,
+    "4 points a cell: filling of the corner": 0.9,
+    "4 points a cell: pressure in the corner": 0.7,
+    "filling of the corner": 0.2,
+    "pressure in the corner": 0.35,
     "72°": 0.015,
 }
 """How far a check that falls short may be off today, by words of its quantity; the first that fits counts."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warp_mpm.simulation import Simulation
-from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, compared, reference, reported, within
+from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, compared, reference, within
 from warp_mpm.validation.paper_runs import paper_scene
 
 SIDE = 0.5
@@ -19,7 +19,7 @@ LATE = 1.2, 1.4
 
 CROWDS = (
     "points sense the flow's divergence where they are: drawn out into rows, they see what spreads these and nothing "
-    "of the gaps between, and so count more room than there is"
+    "of the gaps between, and so count more room than there is; the density correction comes late, and goes on too long"
 )
 
 
@@ -49,26 +49,18 @@ def corner(quick: bool) -> Outcome:
     checks: list[Check] = []
     filled: list[Curve] = [reference(LATE, [1.0, 1.0], "full")]
     pressed: list[Curve] = [reference(LATE, [1.0, 1.0], "as beside it")]
-    for spacing, number in ((0.25, 4),) if quick else ((0.25, 4), (0.25, 9), (0.125, 4)):
+    for spacing, number in ((0.25, 4),) if quick else ((0.25, 4), (0.25, 9), (0.25, 16), (0.125, 4)):
         filling, pressure = corner_squares(spacing, number, times)
         label = f"{spacing:g} m, {number} points a cell"
         mean, load = filling[late].mean(axis=0), pressure[late].mean(axis=0)
         ratio = float(load[0] / load[1:].mean())
-        force = mean * load
         checks += [
             within(f"{label}: filling of the corner", "-", float(mean[0]), 0.9, 1.1, remark=CROWDS),
             compared(f"{label}: pressure in the corner, over that beside it", "-", ratio, 1.0, 0.10, remark=CROWDS),
-            reported(
-                f"{label}: the same, times the filling of either",
-                "-",
-                float(force[0] / force[1:].mean()),
-                reference=1.0,
-                remark="what the momentum balance asks for",
-            ),
         ]
         filled.append(Curve(times, filling[:, 0], label))
-        arrived = pressure[:, 1:].min(axis=1) > 0.0
-        pressed.append(Curve(times[arrived], (pressure[:, 0] / pressure[:, 1:].mean(axis=1))[arrived], label))
+        arrived = pressure.min(axis=1) > 0.0
+        pressed.append(Curve(times[arrived], pressure[arrived, 0] / pressure[arrived, 1:].mean(axis=1), label))
     return Outcome(
         checks=checks,
         panels=[
