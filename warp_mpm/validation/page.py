@@ -48,10 +48,10 @@ Not compared: dam breaks onto a box and a column (Kleefsman, Yeh and Petroff), w
 
 On a smooth ground water runs ahead of every experiment here, ours by 15 % (1.80 √(g H) where 1.57 was measured,
 Ritter's solution having 2), and so it does in other codes that do not resolve its boundary layer. OpenFOAM's
-interFoam has the front of Martin and Moyce's square column 9 to 21 % ahead, at 1.73 √(g a) where 1.49 was measured
-(report F7 of github.com/Certonomous/Certonomous, 2026), and that of their column half as wide 10 % ahead, 3 % once
-its clock is shifted by 0.175 (github.com/vamseeachanta/digitalmodel, pull request 1260), ours 1 % once shifted by
-0.13.
+interFoam has the front of Martin and Moyce's square column 9 to 21 % ahead with cells of a/20, at 1.73 √(g a) where
+1.49 was measured, though 13 % behind with cells of a/8 (report F7 of github.com/Certonomous/Certonomous, 2026), and
+that of their column half as wide 10 % ahead, 3 % once its clock is shifted by 0.175
+(github.com/vamseeachanta/digitalmodel, pull request 1260), ours 1 % once shifted by 0.13.
 
 In the picture a bar across reaches over what was measured, where that is known; a bar upward reaches from the finest
 spacing to the one before.
