@@ -17,10 +17,8 @@ KNOWN_SHORT = {
     "corner": ("filling of the corner", "pressure in the corner"),
     # The roller breaks again and again, so that the place of the front is uncertain by a depth: 13 % too fast.
     "bore": ("speed of the bore",),
-    # Quadrature of the stress in cells that the face cuts; 16 points per cell leave a fourth.
-    "at-rest": ("greatest speed",),
-    # The same at the ground, where a profile cuts cells.
-    "basin": ("greatest speed at the end",),
+    # Points that have moved integrate the stress of cut cells no longer exactly: 1.6 % after 6 s at 0.125 m.
+    "at-rest": ("greatest speed falls with the spacing",),
     # Five cells a radius lose 0.8 % of their angular momentum in two turns at the full time step, ten cells 0.2 %.
     "rotation": ("5 cells a radius, Courant number 0.95: angular momentum",),
     # 1.7 to 2 % of the displacement at the full step, 1.3 % at the half: of the first order in the time step.
@@ -34,8 +32,7 @@ KNOWN_SHORT = {
 """Checks that fall short today, by words of their quantity; anything else that falls short is a fault."""
 
 WORST = {
-    "fluid, 75°, 0.25 m: greatest speed": 0.08,
-    "greatest speed": 0.025,
+    "greatest speed": 0.02,
     "angular momentum": 0.009,
     "displacement at the end": 0.022,
     "slab: kinetic energy lost": 0.05,

@@ -200,6 +200,26 @@ def test_places_of_a_face_begin_at_its_toe_whatever_the_spacing(load_scene, name
         assert np.diff(along) == pytest.approx(0.5, abs=0.02)
 
 
+def test_places_lie_closer_at_the_corners_of_a_profile(load_scene):
+    """Two to a cell cannot bear what a pond at rest gives to the nodes of a corner: a current runs along its basin."""
+    corners = np.array([[-60.0, 0.0], [0.0, 0.0], [3.0, 1.0], [3.4, 1.5], [40.0, 8.0]])
+    scenario = load_scene("case_1", barrier=None, **{"numerics.spacing_m": 0.25, "ground.profile_m": corners.tolist()})
+    grid = fit_grid(scenario)
+    bodies = [body for body in scene_bodies(scenario, grid) if body.name == "ground"]
+    places = places_of(bodies, grid, [False])
+    for k, (begin, end) in list(enumerate(pairwise(corners)))[1:]:
+        along = (end - begin) / np.hypot(*(end - begin))
+        place, stands_for = (places.position - begin)[places.piece == k] @ along, places.length[places.piece == k]
+        order = np.argsort(place)
+        steps, middle = np.diff(place[order]) / 0.25, 0.5 * (place[order][1:] + place[order][:-1])
+        ends = np.hypot(*(end - begin)) if k < 3 else np.inf  # the last piece goes on
+        near = (middle < 0.45) | (middle > ends - 0.45)
+        assert steps[near] == pytest.approx(1.0 / 3.0, abs=0.03)
+        assert steps[~near].max(initial=0.5) == pytest.approx(0.5, abs=0.02)
+        if k < 3:
+            assert stands_for.sum() == pytest.approx(ends)
+
+
 @pytest.mark.parametrize("height", [0.0, 0.05])
 def test_places_of_one_colour_share_no_node(height):
     """So that threads may do them at the same time; and those that stand alone share a node with none."""

@@ -110,9 +110,9 @@ def creep(spacing: float, end_time: float, reserve: float = 1.1) -> float:
 
 # -- the case ----------------------------------------------------------------------------------------------------
 
-CUT_CELLS = (
-    "points integrate the stress of cells that the face cuts with an error of their quadrature; 16 points per cell in "
-    "place of 4 leave a fourth"
+MOVED_ON = (
+    "the start is in balance, but points that have moved integrate the stress of cut cells no longer exactly, and what "
+    "they miss moves them on: from next to nothing the speed along the face grows e-fold in 1.5 s at 0.125 m"
 )
 
 NO_EQUILIBRIUM = (
@@ -131,7 +131,7 @@ def at_rest(quick: bool) -> Outcome:
         found = rest(angle, spacing, end, "undrained", INVISCID)
         name = f"fluid, {angle:g}°, {spacing:g} m"
         checks += [
-            at_most(f"{name}: greatest speed", "of √(g h)", float(found.speed.max()), 0.01, remark=CUT_CELLS),
+            at_most(f"{name}: greatest speed", "of √(g h)", float(found.speed.max()), 0.01),
             at_most(f"{name}: greatest rise of the total energy", "of weight times depth", found.gain, 5e-5),
             at_most(
                 f"{name}: thrust in x, greatest error", "-", float(np.abs(found.thrust[:, 0]).max()), 0.01, percent=True
@@ -158,7 +158,7 @@ def at_rest(quick: bool) -> Outcome:
                 fastest[-1],
                 fastest[-1] < fastest[0],
                 reference=" → ".join(f"{value:.2g}" for value in fastest),
-                remark=CUT_CELLS,
+                remark=MOVED_ON,
             )
         )
     soil_end = 2.0 if quick else 10.0

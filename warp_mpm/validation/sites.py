@@ -11,7 +11,7 @@ from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, at_most, compared, reference, reported
 from warp_mpm.validation.contact import STIFF
-from warp_mpm.validation.scenes import INVISCID, box, scene
+from warp_mpm.validation.scenes import INVISCID, LIQUID_BULK_MODULUS, box, scene
 
 G = 9.81
 SLOPES = (0.0, 8.0, 30.0)
@@ -117,7 +117,7 @@ LEVEL, BASIN = (
 
 SPEED_UNIT = math.sqrt(G * (LEVEL + 1.0))
 
-CUT_CELLS = "points integrate the stress of cells that the ground cuts with an error of their quadrature, as at a face"
+SOFT = {"liquid_bulk_modulus_Pa": 0.1 * LIQUID_BULK_MODULUS}
 
 
 def pond(spacing: float, end_time: float, points_per_cell: int = 4, soil: dict[str, Any] = INVISCID) -> Array:
@@ -134,7 +134,7 @@ def pond(spacing: float, end_time: float, points_per_cell: int = 4, soil: dict[s
         [[x, y - lowest] for x, y in outline],
         "undrained",
         end_time=end_time,
-        soil=soil | {"liquid_bulk_modulus_Pa": 3e6},
+        soil=soil,
         spacing_m=spacing,
         points_per_cell=points_per_cell,
     )
@@ -148,6 +148,12 @@ def pond(spacing: float, end_time: float, points_per_cell: int = 4, soil: dict[s
     return np.array(found)
 
 
+LONGER_STEPS = (
+    "steps are three times as long, and so is what the contact leaves to the next one after its four sweeps: the fluid "
+    "is stirred. At a quarter of the step, or with forty sweeps, 0.4 and 0.13 % are left"
+)
+
+
 def basin(quick: bool) -> Outcome:
     end = 2.0 if quick else 10.0
     checks: list[Check] = []
@@ -157,11 +163,13 @@ def basin(quick: bool) -> Outcome:
         ("fluid", 0.25, 4, INVISCID),
         ("fluid", 0.25, 16, INVISCID),
         ("soil", 0.25, 4, {}),
-    )[: 1 if quick else 4]:
+        ("fluid of a tenth of the stiffness", 0.25, 4, INVISCID | SOFT),
+    )[: 1 if quick else 5]:
         speed = pond(spacing, end, points, soil)
         label = f"{name}, {spacing:g} m, {points} points a cell"
+        at_end = f"{label}: greatest speed at the end", "of √(g h)", float(speed[-1])
         checks += [
-            at_most(f"{label}: greatest speed at the end", "of √(g h)", float(speed[-1]), 1e-3, remark=CUT_CELLS),
+            reported(*at_end, remark=LONGER_STEPS) if "tenth" in name else at_most(*at_end, 1e-3),
             reported(f"{label}: greatest speed at any time", "of √(g h)", float(speed.max())),
         ]
         curves.append(Curve(0.25 * np.arange(1.0, len(speed) + 1.0), 100.0 * speed, label))
