@@ -23,7 +23,7 @@ def call_at_random(unit: str, count: int, archives: dict[str, Path], unzipped: d
         [sys.executable, PROGRAM, archives[unit], unzipped[unit], str(count), log],
         capture_output=True,
         text=True,
-        timeout=1800,
+        timeout=3600,
         check=False,
     )
     assert done.returncode == 0, f"{log.read_text() if log.exists() else None}\n{done.stderr[-4000:]}"

@@ -7,11 +7,15 @@ is from the simulation, set by set, so that neither model changes unnoticed.
 from __future__ import annotations
 
 import json
+import re
+import struct
 import subprocess
 import sys
+import zipfile
 from functools import cache
 from pathlib import Path
 
+import fmpy
 import pytest
 from typer.testing import CliRunner
 
@@ -267,6 +271,37 @@ def test_command_builds_units_in_c_for_all_platforms(
     assert done.exit_code == 0, done.output
     assert done.stdout.endswith(f" kB  for {binaries}\n")
     assert done.stderr == ""
+    with zipfile.ZipFile(tmp_path / f"{unit}.fmu") as built:
+        for name in built.namelist():
+            if name.endswith(".dll"):
+                assert exported(built.read(name)) == functions_of_the_standard("3" if unit.endswith("3") else "2")
+
+
+def exported(library: bytes) -> set[str]:
+    """Names that a library for Windows offers: the export table of a PE32+ file."""
+    head = struct.unpack_from("<I", library, 0x3C)[0]
+    count, size = struct.unpack_from("<H12xH", library, head + 6)
+    table = struct.unpack_from("<I", library, head + 24 + 112)[0]
+    sections = [struct.unpack_from("<8x4I", library, head + 24 + size + 40 * k) for k in range(count)]
+
+    def place(address: int) -> int:
+        return next(raw + address - start for long, start, _, raw in sections if start <= address < start + long)
+
+    named, _, names = struct.unpack_from("<3I", library, place(table) + 24)
+    addresses = struct.unpack_from(f"<{named}I", library, place(names))
+    return {library[place(at) : library.index(b"\0", place(at))].decode() for at in addresses}
+
+
+def functions_of_the_standard(version: str) -> set[str]:
+    """Of co-simulation; a unit of FMI 3.0 has all others too, and refuses them."""
+    header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h").read_text()
+    of_model_exchange = {
+        *("EnterEventMode", "NewDiscreteStates", "EnterContinuousTimeMode", "CompletedIntegratorStep", "SetTime"),
+        *("SetContinuousStates", "GetDerivatives", "GetEventIndicators", "GetContinuousStates"),
+        "GetNominalsOfContinuousStates",
+    }
+    found = set(re.findall(r"^\s*FMI\d_Export\s+fmi\w+TYPE\s+(fmi\w+)\s*;", header, re.MULTILINE))
+    return found if version == "3" else found - {f"fmi2{name}" for name in of_model_exchange}
 
 
 def test_command_says_for_which_platform_alone_the_c_unit_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
