@@ -11,7 +11,7 @@ from .simulator.laws import DEFAULT, LAWS, Law
 from .simulator.point_field import PointField
 from .simulator.schemes import SCHEMES, Scheme
 
-LONGEST_NAME = 220
+LONGEST_NAME = 200
 """Characters of a module's name: file systems take 255, and Warp adds a hash and an ending."""
 
 

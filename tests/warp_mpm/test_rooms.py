@@ -362,7 +362,7 @@ def test_a_modules_name_fits_into_a_file_name():
         for number in range(3)
     }
     assert len(names) == 3
-    assert max(map(len, names)) <= 220
+    assert max(map(len, names)) <= 200
 
 
 def test_what_cannot_be_registered():
