@@ -53,7 +53,11 @@ def _ways(scenes: list[Scenario], slopes: tuple[float, float], times: Array, fro
         def place(simulation: Simulation = simulation, slope: float = slope) -> float:
             points = simulation.points()
             way = _along(points["position"], slope)
-            return float(np.quantile(way, 0.98)) if front else float(np.average(way, weights=points["solid_mass"]))
+            if not front:
+                return float(np.average(way, weights=points["solid_mass"]))
+            order = np.argsort(way)
+            behind = np.cumsum(points["solid_mass"][order])
+            return float(np.interp(0.98 * behind[-1], behind, way[order]))
 
         start, moved = place(), []
         for time in times:
