@@ -86,8 +86,7 @@ KNOWN_LIMITS = (
     "(`one_point`), by 2.1 to 2.7 % where a soft dry block does (`dry_soft_45`), with a point to a cell (`points_1`), "
     "where a dry flow meets a wet heap (`wet_deposit`), "
     "where a block falls onto the ground (`falling_block`), under a dilatancy a hundred times as strong "
-    "(`dilatancy_100`) and with FLIP (`flip`), by 5 % where a jet of 30 m/s plunges into a full basin and "
-    "its spray falls back otherwise (`inflow_full_basin`), and by 17 % with FLIP faster than sound (`flip_soft`).",
+    "(`dilatancy_100`) and with FLIP (`flip`), and by 17 % with FLIP faster than sound (`flip_soft`).",
     "Pressures of points scatter about their cells' by more than a quarter of the signal where a thin jet lands "
     "(`falling_jet`, 0.27), in the tip of a wedge that closes (`closing_wedge`, 0.28), and before a barrier that is "
     "shaken at 10 Hz (`driven_shaken`, 0.39).",
@@ -128,7 +127,6 @@ KNOWN_FAILURES = {
     "flip": {"halving_peak_force": 0.0226},
     "flip_soft": {"halving_peak_force": 0.166, "pushed_share": 0.00124},
     "ground_steps": {"pushed_share": 0.00942},
-    "inflow_full_basin": {"halving_peak_force": 0.0498},
     "mixture_viscosity_1e6": {"pressure_noise": 0.268},
     "mud_viscosity_1e6": {"pressure_noise": 0.272},
     "mud_yield_1e6": {"pressure_noise": 0.333},
