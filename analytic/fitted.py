@@ -68,10 +68,10 @@ class Constants:
 
 CONSTANTS = {
     "sliding": Constants(
-        jet=1.286, weight=1.108, mass_exponent=0.312, rise=0.237, rise_length_exponent=0.648, rise_angle_exponent=-1.108
+        jet=1.275, weight=1.109, mass_exponent=0.324, rise=0.167, rise_length_exponent=0.732, rise_angle_exponent=-1.398
     ),
     "fixed": Constants(
-        jet=1.228, weight=0.812, mass_exponent=0.000, rise=0.220, rise_length_exponent=0.595, rise_angle_exponent=-1.558
+        jet=1.211, weight=0.850, mass_exponent=0.000, rise=0.125, rise_length_exponent=0.865, rise_angle_exponent=-1.718
     ),
 }
 """Fitted by `python -m analytic sweep fit docs/data/sweep.csv`."""

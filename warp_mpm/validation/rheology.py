@@ -293,6 +293,12 @@ def between_planes(mud: dict[str, Any], cells: int, length: float, end: float) -
 # -- a heap of Bingham fluid ---------------------------------------------------------------------------------------
 
 
+TOE_BEHIND = (
+    "the toe, thinner than two cells, stays behind and is steeper than a thin layer's: at 0.95 x_f 25 and 44 % are "
+    "missing with cells of 0.04 and 0.02 m, and from a third of the way on 5 to 7 % are too much"
+)
+
+
 def heap(quick: bool) -> Outcome:
     yield_stress, volume = 0.03 * DENSITY * G, 1.0
     front = (9.0 * volume**2 / (8.0 * 0.03)) ** (1.0 / 3.0)
@@ -335,7 +341,14 @@ def heap(quick: bool) -> Outcome:
     height = float(np.interp(0.5 * front, middle, depth))
     checks += [
         compared("mean distance from the middle", "m", mean, exact, 0.05),
-        compared("depth half way to the front", "m", height, float(np.interp(0.5 * front, fine, shape)), 0.05),
+        compared(
+            "depth half way to the front",
+            "m",
+            height,
+            float(np.interp(0.5 * front, fine, shape)),
+            0.05,
+            remark=TOE_BEHIND,
+        ),
         at_most(
             "shape up to 0.9 x_f, rms error",
             "of the depth in the middle",
@@ -430,6 +443,12 @@ def bagnold_profile(y: Array, slope: float) -> Array:
     return surface * (1.0 - np.clip(1.0 - y, 0.0, None) ** 1.5)
 
 
+SENSITIVE = (
+    "so near to μ_s the speed tells of the friction: a percent of μ changes it by 12 % at 23° and by 8 % at 25° and "
+    "27°, so that the three speeds are those of a stress that is 0.6, 0.1 and 0.4 % off"
+)
+
+
 def bagnold(quick: bool) -> Outcome:
     ladder = (4, 8) if quick else (5, 10, 20)
     checks: list[Check] = []
@@ -447,8 +466,22 @@ def bagnold(quick: bool) -> Outcome:
             curves.append(Curve(speed[order], y[order], f"{cells} cells deep", "."))
         top = y > 1.0 - 1.5 / cells
         checks += [
-            compared(f"{slope:g}°: speed of the surface", "m/s", float(speed[top].mean()), float(exact[-1]), 0.05),
-            at_most(f"{slope:g}°: profile, largest error", "of the surface's speed", errors[-1], 0.05, percent=True),
+            compared(
+                f"{slope:g}°: speed of the surface",
+                "m/s",
+                float(speed[top].mean()),
+                float(exact[-1]),
+                0.05,
+                remark=SENSITIVE,
+            ),
+            at_most(
+                f"{slope:g}°: profile, largest error",
+                "of the surface's speed",
+                errors[-1],
+                0.05,
+                percent=True,
+                remark=SENSITIVE,
+            ),
             reported(f"{slope:g}°: that error over the one of {ladder[0]} cells", "-", errors[-1] / errors[0]),
         ]
         panels.append(Panel(f"{slope:g}°", "speed [m/s]", "height [m]", curves))
@@ -773,7 +806,7 @@ CASES = (
         name="heap",
         title="Heap of Bingham fluid",
         tests="A block of 1.25 m by 0.8 m beside a smooth wall (half of a heap) is let go on a rough bed and comes to "
-        "rest, τ_y = 530 Pa, 200 Pa s.",
+        "rest, τ_y = 530 Pa, 100 Pa s.",
         source="thin layers: h = √(2 τ_y (x_f − x)/(ρ g)), x_f = (9 V² ρ g/(8 τ_y))^⅓",
         limit="mean distance and depth 5 %, shape 5 % of the depth; speed 2 mm/s",
         run=heap,
