@@ -172,7 +172,7 @@ BASE = {"bodies.base_friction"}
 
 @pytest.mark.parametrize(
     "name",
-    ["case_1", "case_1_dry", *(pytest.param(f"case_1_{of}", marks=pytest.mark.slow) for of in ("fixed", "undrained"))],
+    ["case_1", *(pytest.param(f"case_1_{of}", marks=pytest.mark.slow) for of in ("fixed", "dry", "undrained"))],
 )
 def test_without_friction_nothing_of_it_is_there(load_scene, name):
     changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 0.01, "barrier.friction": 0.0}

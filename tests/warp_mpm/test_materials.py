@@ -140,13 +140,8 @@ def mass_of(scenario):
     return scenario.flow.volume * scenario.flow.material.density + scenario.flow.deposited_mass
 
 
-@pytest.mark.parametrize(
-    ("lower", "formulation"),
-    [
-        pytest.param(*layer, id=name, marks=[] if name == "dry below" else pytest.mark.slow)
-        for name, layer in LAYERS.items()
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("lower", "formulation"), LAYERS.values(), ids=LAYERS)
 def test_layers_at_rest_stay_at_rest(lower, formulation):
     """As still as two layers of one material, whose corners settle by as much; but for what seeps out of the wet one
     where that lies on a dry one (5 cm of water in 0.1 s at most)."""

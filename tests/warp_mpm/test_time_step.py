@@ -129,7 +129,9 @@ def growth_of_a_lone_point(load_scene, transfer, place, step):
     return greatest
 
 
-@pytest.mark.parametrize("transfer", ["apic", "aflip", "flip"])
+@pytest.mark.parametrize(
+    "transfer", ["aflip", *(pytest.param(transfer, marks=pytest.mark.slow) for transfer in ("apic", "flip"))]
+)
 @pytest.mark.parametrize("place", [0.5, 0.7, 0.95])
 def test_limit_of_a_lone_point(load_scene, transfer, place):
     """Just below the limit that its place in the cell gives it does not grow, just above it does."""
