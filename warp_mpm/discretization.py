@@ -26,6 +26,10 @@ TOUCHING = 1e-3
 SMALLEST_POINT = 0.25
 """Least volume of a material point, as a share of a whole one; a smaller piece is joined to a neighbour."""
 
+SMALLEST_PART = 0.005
+"""Least part of a cell, as a share of it, that has points of its own where a flow at rest is filled exactly. Contact
+hardly holds nodes that lighter points alone reach: in a corner of the ground they would sink in."""
+
 EQUAL_WEIGHTS: dict[int, tuple[float, ...]] = {
     2: (-math.sqrt(1 / 3), math.sqrt(1 / 3)),
     3: (-math.sqrt(1 / 2), 0.0, math.sqrt(1 / 2)),
@@ -198,28 +202,39 @@ def _fill_exactly(polygon: geometry.Polygon, spacing: float, per_side: int) -> t
 
     In a cell, a spline of the nodes is of second degree in x and in y, and so is its slope times a pressure that is
     linear, but for one degree more in one of them. A whole cell has `per_side`² points of equal volume, a part of a
-    cell six to each trapezoid of it.
+    cell six to each trapezoid of it; a part of less than `SMALLEST_PART` is joined to a neighbour.
     """
-    _, middles, cut = _squares(polygon, spacing)
+    shape, middles, cut = _squares(polygon, spacing)
     whole = geometry.contains(polygon, middles)
-    cells, positions, volumes = [], [], []
-    for index in np.flatnonzero(cut):
-        part = _part_in_square(polygon, middles[index], spacing)
-        share = geometry.area(part) / spacing**2
-        whole[index] = share > 1.0 - 1e-12
-        if share > 1e-14 and not whole[index]:
-            position, volume = _integrating(part)
-            cells.append(np.full(len(volume), index))
-            positions.append(position)
-            volumes.append(volume)
     steps = 0.5 * spacing * np.array(EQUAL_WEIGHTS[per_side])
     lattice = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    cells.append(np.repeat(np.flatnonzero(whole), per_side**2))
-    positions.append((middles[whole][:, None] + lattice).reshape(-1, 2))
-    volumes.append(np.full(len(cells[-1]), (spacing / per_side) ** 2))
-    order = np.argsort(np.concatenate(cells), kind="stable")
-    position, volume = np.concatenate(positions)[order], np.concatenate(volumes)[order]
-    return position[volume > 0.0], volume[volume > 0.0]
+    share = whole.astype(float)
+    parts = {}
+    for index in map(int, np.flatnonzero(cut)):
+        parts[index] = _part_in_square(polygon, middles[index], spacing)
+        share[index] = geometry.area(parts[index]) / spacing**2
+    filled = share > 1e-14  # what is less is rounding, and has no centre
+    joined: dict[int, list[int]] = {}
+    for index in map(int, np.flatnonzero(filled & (share < SMALLEST_PART))):
+        largest = _largest_neighbour(share, index, shape)
+        if largest is not None and share[largest] >= SMALLEST_PART:
+            joined.setdefault(largest, []).append(index)
+            filled[index] = False
+    positions, volumes = [], []
+    for index in map(int, np.flatnonzero(filled)):
+        if share[index] > 1.0 - 1e-12:
+            position, volume = middles[index] + lattice, np.full(per_side**2, (spacing / per_side) ** 2)
+        else:
+            position, volume = _integrating(parts[index])
+        if index in joined:
+            own = volume.sum()
+            more = share[joined[index]] * spacing**2
+            off = np.array([geometry.centroid(parts[other]) for other in joined[index]]) - volume @ position / own
+            position = position + more @ off / (own + more.sum())
+            volume = volume * (1.0 + more.sum() / own)
+        positions.append(position[volume > 0.0])
+        volumes.append(volume[volume > 0.0])
+    return np.concatenate(positions), np.concatenate(volumes)
 
 
 def _integrating(part: geometry.Polygon) -> tuple[Array, Array]:
@@ -287,22 +302,29 @@ def _join_slivers(
     volume: Array, position: Array, shape: tuple[int, int], candidates: NDArray[np.int64], least: float
 ) -> None:
     """Move the volume of pieces below `least` to their largest neighbour, in place, smallest piece first."""
-    columns, rows = shape
     for index in sorted(candidates, key=lambda candidate: volume[candidate]):
         if not 0.0 < volume[index] < least:
             continue
-        column, row = divmod(int(index), rows)
-        # Neighbours across a side come before those across a corner.
-        for steps in (((-1, 0), (1, 0), (0, -1), (0, 1)), ((-1, -1), (-1, 1), (1, -1), (1, 1))):
-            neighbours = [
-                (column + i) * rows + row + j for i, j in steps if 0 <= column + i < columns and 0 <= row + j < rows
-            ]
-            target = max(neighbours, key=lambda neighbour: volume[neighbour], default=int(index))
-            if target != index and volume[target] > 0.0:
-                joined = volume[target] + volume[index]
-                position[target] = (volume[target] * position[target] + volume[index] * position[index]) / joined
-                volume[target], volume[index] = joined, 0.0
-                break
+        target = _largest_neighbour(volume, int(index), shape)
+        if target is not None:
+            joined = volume[target] + volume[index]
+            position[target] = (volume[target] * position[target] + volume[index] * position[index]) / joined
+            volume[target], volume[index] = joined, 0.0
+
+
+def _largest_neighbour(volume: Array, index: int, shape: tuple[int, int]) -> int | None:
+    """Of the squares about one, which holds most; those across a side come before those across a corner. None: all are
+    empty."""
+    columns, rows = shape
+    column, row = divmod(index, rows)
+    for steps in (((-1, 0), (1, 0), (0, -1), (0, 1)), ((-1, -1), (-1, 1), (1, -1), (1, 1))):
+        neighbours = [
+            (column + i) * rows + row + j for i, j in steps if 0 <= column + i < columns and 0 <= row + j < rows
+        ]
+        target = max(neighbours, key=lambda neighbour: volume[neighbour], default=index)
+        if target != index and volume[target] > 0.0:
+            return target
+    return None
 
 
 def arriving_points(inflow: Inflow, spacing: float, points_per_cell: int) -> ArrivingPoints:

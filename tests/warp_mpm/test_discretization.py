@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warp_mpm import geometry
+from warp_mpm import discretization, geometry
 from warp_mpm.discretization import SMALLEST_POINT, fill_polygon, material_points
 from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError
@@ -74,14 +74,26 @@ def to_nodes(position, volume, spacing, at_top):
 
 
 @pytest.mark.parametrize("points_per_cell", [4, 9, 16])
-def test_what_lies_at_rest_on_a_slope_is_in_balance_at_every_node(points_per_cell):
+def test_what_lies_at_rest_on_a_slope_is_in_balance_at_every_node(points_per_cell, monkeypatch):
     spacing = 0.25
-    exact = to_nodes(*fill_polygon(BASIN, spacing / 4, 16, at_rest=True), spacing, 1.5)
+    with monkeypatch.context() as patch:
+        patch.setattr(discretization, "SMALLEST_PART", 0.0)
+        exact = to_nodes(*fill_polygon(BASIN, spacing / 4, 16, at_rest=True), spacing, 1.5)
     position, volume = fill_polygon(BASIN, spacing, points_per_cell, at_rest=True)
     assert geometry.contains(BASIN, position).all()
     np.testing.assert_allclose(to_nodes(position, volume, spacing, 1.5), exact, atol=1e-12)
     moving = to_nodes(*fill_polygon(BASIN, spacing, points_per_cell), spacing, 1.5)
     assert np.abs(moving - exact).max() > 1e-4
+
+
+def test_next_to_nothing_of_a_cell_has_no_points_of_its_own():
+    """0.03 % of a cell in the basin's corner, which the cell above takes in, with volume and centre."""
+    spacing, corner = 0.5, np.array([[-1.0, 1.0], [-0.5, -0.01], [0.9, 1.0]])
+    position, volume = fill_polygon(corner, spacing, 4, at_rest=True)
+    assert position[:, 1].min() > 0.0
+    assert volume.min() > 1e-4 * spacing**2
+    assert volume.sum() == pytest.approx(geometry.area(corner), rel=1e-12)
+    assert volume @ position / volume.sum() == pytest.approx(geometry.centroid(corner), rel=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["front_and_tail", "block"])
