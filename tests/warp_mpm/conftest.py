@@ -129,6 +129,19 @@ def load_scene():
 
 
 @pytest.fixture(scope="session")
+def largest_difference():
+    """Of all that the points of two simulations hold, over the greatest of its kind."""
+
+    def found(one, other):
+        return max(
+            float(np.abs(other.points()[name] - values).max() / (np.abs(values).max() or 1.0))
+            for name, values in one.points().items()
+        )
+
+    return found
+
+
+@pytest.fixture(scope="session")
 def coarse_case_1(load_scene):
     changes = {"numerics.spacing_m": 0.5, "output.end_time_s": 3.0}
     return Scenario.model_validate(load_scene("case_1").replaced(changes).resolved())

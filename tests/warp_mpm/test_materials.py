@@ -241,16 +241,7 @@ def case_with_heap(own, spacing=0.5, **changes):
     return Scenario.load(CASE_1).replaced(changes)
 
 
-def largest_difference(one, other):
-    """Of all that points hold, over the greatest of its kind."""
-    found = 0.0
-    for name, values in one.points().items():
-        scale = np.abs(values).max() or 1.0
-        found = max(found, float(np.abs(other.points()[name] - values).max() / scale))
-    return found
-
-
-def test_points_of_a_material_are_launched_together(monkeypatch):
+def test_points_of_a_material_are_launched_together(monkeypatch, largest_difference):
     """One launch over the points of each, so that its numbers are the same for all of them and `update` stays a loop
     of vector instructions; a material that differs by next to nothing changes as much."""
     plain, own = (Simulation(case_with_heap(material)) for material in ({}, {"material": {"cohesion_Pa": 1e-9}}))
@@ -277,7 +268,7 @@ def test_points_of_a_material_are_launched_together(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["two_phase", "undrained"])
-def test_sums_at_the_nodes_are_the_constants_of_equal_materials(formulation):
+def test_sums_at_the_nodes_are_the_constants_of_equal_materials(formulation, largest_difference):
     """Grains that are heavier by the last digit: liquid, drag and filling are summed up at the nodes, and all comes out
     as without. (apic: aflip damps what the nodes do not see in another way where materials differ.)"""
     changes = {"ground.friction": 0.3, "numerics.transfer": "apic"}

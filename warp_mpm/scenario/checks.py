@@ -9,7 +9,6 @@ import numpy as np
 from warp_mpm import geometry
 from warp_mpm.scenario.barrier import Prescribed, Sliding, Trapezoid
 from warp_mpm.scenario.inflow import APPROACH, Inflow
-from warp_mpm.scenario.other_material import OtherMaterial
 from warp_mpm.scenario.site import all_standing, lowest_ground, site_problems
 
 if TYPE_CHECKING:
@@ -54,13 +53,9 @@ def problems(scenario: Scenario) -> list[str]:
         )
     flow = scenario.flow
     named = [("flow.material", flow.material)]
-    bodies: list[tuple[str, OtherMaterial]] = [(f"deposits[{k}]", one) for k, one in enumerate(flow.deposits)]
-    if flow.inflow is not None:
-        bodies.append(("inflow", flow.inflow))
-        bodies += [(f"inflow.surges[{k}]", one) for k, one in enumerate(flow.inflow.surges)]
     named += [
         (f"flow.{body}.material", flow.material_of(own))
-        for body, own in bodies
+        for body, own in flow.others
         if flow.material_of(own) != flow.material
     ]
     for name, material in named if scenario.numerics.drag == "explicit" else ():

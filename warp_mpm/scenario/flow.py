@@ -470,12 +470,8 @@ class _FlowBase(VelocityProfile):
     @model_validator(mode="after")
     def _other_materials(self) -> Self:
         wet = [] if formulation_of(self.material) == "dry" else [self.material]
-        bodies: list[tuple[str, OtherMaterial]] = [(f"deposits[{k}].", one) for k, one in enumerate(self.deposits)]
-        if self.inflow is not None:
-            bodies.append(("inflow.", self.inflow))
-            bodies += [(f"inflow.surges[{k}].", one) for k, one in enumerate(self.inflow.surges)]
-        for body, one in bodies:
-            name = f"{body}material"
+        for body, one in self.others:
+            name = f"{body}.material"
             try:
                 own = self.material_of(one)
             except ScenarioError as error:
@@ -488,7 +484,7 @@ class _FlowBase(VelocityProfile):
             wet.append(own)
             if formulation != formulation_of(wet[0]):
                 raise ValueError(
-                    f'{body}formulation = "{formulation}" is not allowed, as what is wet in a scene '
+                    f'{body}.formulation = "{formulation}" is not allowed, as what is wet in a scene '
                     f'has one formulation; it must be "{formulation_of(wet[0])}" or "dry"'
                 )
             for field in COMMON:
@@ -580,6 +576,15 @@ class _FlowBase(VelocityProfile):
         times, volumes = self.inflow.passing
         densities = np.array([part.material.density for part in parts])
         return volumes, volumes * densities[part_at(parts, times, self.inflow.density(times))]
+
+    @property
+    def others(self) -> list[tuple[str, OtherMaterial]]:
+        """What may be of another material, with its name below `flow`: deposits, what arrives, its later surges."""
+        found: list[tuple[str, OtherMaterial]] = [(f"deposits[{k}]", one) for k, one in enumerate(self.deposits)]
+        if self.inflow is not None:
+            found.append(("inflow", self.inflow))
+            found += [(f"inflow.surges[{k}]", one) for k, one in enumerate(self.inflow.surges)]
+        return found
 
     def material_of(self, body: OtherMaterial) -> Skeleton:
         """The material of a body: the flow's, but for what its own says. What is left out of another law's fields
