@@ -445,7 +445,7 @@ class Simulation:
         in_flow = [(end, begin, step) for end, begin in zip(ends, arriving, strict=True)]
         if in_flow != self._in_flow:
             self._in_flow = in_flow
-            self._clock_arrays["flow"].assign(np.array(in_flow, dtype=np.int32).ravel())
+            self._fill(self._clock_arrays["flow"], np.array(in_flow, dtype=np.int32).ravel())
 
     def prepare(self) -> None:
         """Compile the kernels, or find them compiled, and capture an interval; the first step does so otherwise."""
@@ -631,13 +631,13 @@ class Simulation:
                 return arrays[name].numpy()
         return self._clock_arrays[name].numpy()
 
-    def _fill(self, array: Any, value: float | tuple[float, float]) -> None:
+    def _fill(self, array: Any, value: float | tuple[float, float] | NDArray[np.int32]) -> None:
         """Set all of an array on the device; on the CPU behind Warp's back, which may be at work for another thread."""
         if self.device.is_cpu:
             array.numpy()[...] = value
             return
         with _WARP:
-            array.fill_(value)
+            array.assign(value) if isinstance(value, np.ndarray) else array.fill_(value)
 
     def _clock_entry(self, entry: int) -> float:
         return float(self._read("clock")[entry])

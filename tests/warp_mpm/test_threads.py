@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import warp as wp
+
+from warp_mpm import Scenario, Simulation
+
 SCENES = Path(__file__).parents[2] / "scenarios"
 
 PROGRAM = """
@@ -55,3 +59,23 @@ def test_threads_make_and_run_simulations_of_their_own():
     assert told["failed"] == []
     assert len(told["ran"]) == 24
     assert all(numbers == told["alone"][name] for name, numbers in told["ran"])
+
+
+def test_a_prepared_simulation_calls_nothing_of_warp_that_another_threads_capture_would_trip(monkeypatch):
+    """Warp asks whether anyone captures, and then whoever does: between the two, the capture can have ended."""
+    scenario = Scenario.load(SCENES / "case_1.json").replaced({"numerics.spacing_m": 0.75})
+    simulation = Simulation(scenario)
+    simulation.prepare()
+    simulation.restore_state(simulation.save_state())
+
+    def refuse(*_, **__):
+        raise AssertionError("through Warp, without its lock")
+
+    for name in ("assign", "fill_", "zero_"):
+        monkeypatch.setattr(wp.array, name, refuse)
+    for name in ("copy", "launch", "empty", "zeros", "capture_begin"):
+        monkeypatch.setattr(wp, name, refuse)
+    for count in range(1, 4):
+        simulation.advance(0.02 * count)
+        assert simulation.sample(["time"])["time"] == 0.02 * count
+    simulation.save_state()
