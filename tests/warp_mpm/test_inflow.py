@@ -307,13 +307,13 @@ def test_snapshots_hold_what_has_arrived_and_no_more(arrived):
 def test_what_waits_is_not_gone_over():
     simulation = Simulation(paper_block(-6.0))
     simulation.advance(0.1)
-    assert simulation._counts["points"] < 0.3 * simulation.material_points
+    assert simulation._stepping.counts["points"] < 0.3 * simulation.material_points
     # What is held has no noise that a filter would take for such once it is let go.
     held = simulation._point_arrays["inside"].numpy() == HELD
     assert held.sum() > 20
     assert not simulation._point_arrays["pressure_residual"].numpy()[held].any()
     simulation.advance(1.0)
-    assert 0.4 * simulation.material_points < simulation._counts["points"] < 0.8 * simulation.material_points
+    assert 0.4 * simulation.material_points < simulation._stepping.counts["points"] < 0.8 * simulation.material_points
     # Kernels over the flow end where what waits begins; the one that looks for what arrives begins behind what had
     # when it was last told.
     simulation.advance(1.001)

@@ -17,6 +17,7 @@ from warp_mpm.scenario import Scenario
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.simulation import Simulation
 from warp_mpm.snapshot import snapshot_of
+from warp_mpm.stepping import Stepping
 from warp_mpm.time_step import step_limits
 
 CASE_1 = Path(__file__).parents[2] / "scenarios" / "case_1.json"
@@ -247,13 +248,13 @@ def test_points_of_a_material_are_launched_together(monkeypatch, largest_differe
     plain, own = (Simulation(case_with_heap(material)) for material in ({}, {"material": {"cohesion_Pa": 1e-9}}))
     assert own.effects == plain.effects
     spans = []
-    launch = Simulation._launch
+    launch = Stepping.launch
 
-    def noting(simulation, one, dim, *rest):
+    def noting(stepping, one, dim, *rest):
         spans.append((one.kernel, dim))
-        launch(simulation, one, dim, *rest)
+        launch(stepping, one, dim, *rest)
 
-    monkeypatch.setattr(Simulation, "_launch", noting)
+    monkeypatch.setattr(Stepping, "launch", noting)
     own.prepare()
     heap = int((own.points()["material"] == 1.0).sum())
     assert [dim for kernel, dim in spans if kernel == "update"] == [own.material_points - heap, heap]

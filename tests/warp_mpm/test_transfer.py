@@ -81,10 +81,10 @@ class Bench:
         simulation = self.simulation
         (launch,) = (one for one in launches(simulation.effects) if one.kernel == kernel)
         if launch.over in ("points", "flow"):
-            simulation._launch_over_points(launch)
+            simulation._stepping.launch_over_points(launch)
             return
-        arguments = [simulation._arguments[name] for name in launch.takes]
-        simulation._launch(launch, simulation._counts[launch.over], arguments)
+        arguments = [simulation._stepping.arguments[name] for name in launch.takes]
+        simulation._stepping.launch(launch, simulation._stepping.counts[launch.over], arguments)
 
     def scatter(self):
         simulation = self.simulation
