@@ -8,8 +8,8 @@ import numpy as np
 
 from warp_mpm.extent import Travel, barrier_travel, domain_extent
 from warp_mpm.scenario import Barrier, Ground, Prescribed, Scenario, Skeleton, Sliding, Trapezoid
-from warp_mpm.scenario.flow import formulation_of
 from warp_mpm.scenario.inflow import surges_of
+from warp_mpm.scenario.material import formulation_of
 
 
 def described(scenario: Scenario) -> list[str]:

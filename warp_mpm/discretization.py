@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from warp_mpm import geometry
 from warp_mpm.scenario import Inflow, Scenario, Skeleton
-from warp_mpm.scenario.flow import formulation_of, part_at
+from warp_mpm.scenario.arriving import part_at
 from warp_mpm.scenario.inflow import APPROACH
+from warp_mpm.scenario.material import formulation_of
 from warp_mpm.scenario.other_material import OtherMaterial
 from warp_mpm.simulator.laws import LAWS
 

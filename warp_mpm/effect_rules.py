@@ -8,7 +8,7 @@ from typing import Any
 
 from .effects import Effects, Kind
 from .scenario import DryFlow, Ground, Scenario, Skeleton, TwoPhaseFlow, TwoPhaseMaterial, UndrainedMaterial
-from .scenario.flow import formulation_of
+from .scenario.material import formulation_of
 from .scenario.other_material import OtherMaterial
 from .simulator.bodies.of_scene import ground_body
 from .simulator.bodies.outline import FEW

@@ -10,7 +10,7 @@ effect. `docs/develop/add_a_law.md` goes through one.
 
 from __future__ import annotations
 
-from warp_mpm.scenario.flow import TwoPhaseMaterial
+from warp_mpm.scenario.material import TwoPhaseMaterial
 from warp_mpm.scenario.scene import offer_anew
 from warp_mpm.schema import Model
 from warp_mpm.simulator.laws import LAWS, Law

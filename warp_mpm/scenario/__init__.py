@@ -17,21 +17,11 @@ from warp_mpm.scenario.barrier import (
     Wall,
 )
 from warp_mpm.scenario.design import Boulder, Design
-from warp_mpm.scenario.flow import (
-    Deposit,
-    DryFlow,
-    Flow,
-    FlowOnGround,
-    FlowPolygon,
-    FrontAndTail,
-    Skeleton,
-    TwoPhaseFlow,
-    TwoPhaseMaterial,
-    UndrainedFlow,
-    UndrainedMaterial,
-)
+from warp_mpm.scenario.flow import DryFlow, Flow, TwoPhaseFlow, UndrainedFlow
+from warp_mpm.scenario.flow_outline import Deposit, FlowOnGround, FlowPolygon, FrontAndTail
 from warp_mpm.scenario.ground import Ground, Stretch
 from warp_mpm.scenario.inflow import Inflow, Surge
+from warp_mpm.scenario.material import Skeleton, TwoPhaseMaterial, UndrainedMaterial
 from warp_mpm.scenario.scene import Scenario, json_schema
 from warp_mpm.scenario.settings import STANDARD_GRAVITY, Domain, Gravity, Numerics, Output
 

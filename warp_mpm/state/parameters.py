@@ -11,7 +11,7 @@ from ..effects import Effects
 from ..grid import GridLayout
 from ..kernels import layout as at
 from ..scenario import STANDARD_GRAVITY, Scenario, Trapezoid
-from ..scenario.flow import formulation_of
+from ..scenario.material import formulation_of
 from ..simulator.bodies import Body
 from ..simulator.bodies.of_scene import BARRIER
 from ..simulator.bodies.outline import ENDLESS
