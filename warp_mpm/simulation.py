@@ -75,7 +75,7 @@ GROWTHS = 12
 """Times at most that a run with an inflow is captured anew, for more points."""
 
 LOADS = ("taken", "turned")
-"""Sums of the barrier's slots and surfaces since t = 0."""
+"""Sums of the barriers' slots and surfaces since t = 0."""
 
 
 def _check_names(bodies: Sequence[Body]) -> None:
@@ -212,9 +212,9 @@ class Simulation:
         """All that the flow meets, in the order in which they act on it."""
         _check_names(self.bodies)
         self.slots = slots_of(scenario, self.bodies)
-        """The barrier's surfaces, divided; None without a barrier."""
-        if self.slots is not None:
-            self._patches = Patches.along(self.slots.face, scenario.output.pressure_patch_m)
+        """The surfaces of each barrier, divided, by its name."""
+        length = scenario.output.pressure_patch_m
+        self._patches = {name: Patches.along(slots.face, length) for name, slots in self.slots.items()}
         self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
         if channel is not None:
             self.effects = replace(self.effects, dimensions=3)
@@ -322,7 +322,7 @@ class Simulation:
         if effects.bodies:
             lanes = 1 if device.is_cpu else LANES
             contact = contact_arrays(
-                self.bodies, effects, types, self.grid, slots=self.slots, lanes=lanes, device=device
+                self.bodies, effects, types, self.grid, slots=self.slots.values(), lanes=lanes, device=device
             )
             self._contact, self._contact_arrays = contact.structure, contact.arrays
         self._arrival, self._arrival_arrays = None, {}
@@ -782,12 +782,12 @@ class Simulation:
         Pressures on a patch are means over `output.pressure_patch_s`: where that is longer than the caller's intervals,
         `Window.after` keeps what is needed of the marks before.
         """
-        if self._barrier is None:
+        if not self.slots:
             return Window(self._clock_entry(at.TIME), self._read("reactions").tolist())
         return Window(
             self._clock_entry(at.TIME),
             self._read("reactions").tolist(),
-            self._number_of(self._barrier, "base_impulse"),
+            self._number_of(self._barrier, "base_impulse") if self._barrier is not None else 0.0,
             self._read("turned").tolist(),
             self._read("taken").copy(),
             reach=self.scenario.output.pressure_patch_s,
@@ -844,9 +844,10 @@ class Simulation:
     def _now(self, now: Window, since: Window, sums: Sequence[float]) -> Now:
         barrier = self._motion_of(self._barrier) if self._barrier is not None else BarrierNow()
         forces, base_force = mean_forces(self.bodies, now, since)
-        loads = (
-            None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, self._patches, now, since)
-        )
+        loads = {
+            name: LoadsNow(self.scenario, self.bodies, slots, self._patches[name], now, since)
+            for name, slots in self.slots.items()
+        }
         return Now(
             scenario=self.scenario,
             bodies=self.bodies,
@@ -857,7 +858,8 @@ class Simulation:
             elapsed=now.time - since.time,
             forces=forces,
             base_force=base_force,
-            loads=loads,
+            loads=loads.get(BARRIER),
+            loads_on=loads,
             impulses=now.reactions,
             initial_momentum=self._initial_momentum,
             points=self.points,
@@ -905,7 +907,7 @@ class Simulation:
             "balance": self._balance,
             "grid.shift": self._grid_arrays["shift"],
         }
-        if self.slots is not None:
+        if self.slots:
             arrays |= {f"contact.{name}": self._contact_arrays[name] for name in LOADS}
         arrays |= {f"arrival.{name}": self._arrival_arrays[name] for name in ARRIVED if name in self._arrival_arrays}
         arrays |= {f"bodies.{name}": array for name, array in self._body_arrays.items() if name in STATE_OF_BODIES}

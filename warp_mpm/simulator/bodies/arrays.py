@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
@@ -18,7 +18,7 @@ from warp_mpm.kernels.layout import SLOT_SIZE
 
 from .body import Body, Driven, Sliding
 from .kernels import NEAR
-from .loads import Slots
+from .loads import Slots, feet, shares
 from .outline import ENDLESS, FEW, Segments
 from .places import Places, by_block, coloured, neighbours, places_of, sharing
 
@@ -167,7 +167,7 @@ def contact_arrays(
     types: SimpleNamespace,
     grid: GridLayout,
     *,
-    slots: Slots | None,
+    slots: Collection[Slots],
     lanes: int,
     device: Any,
 ) -> Group:
@@ -178,7 +178,7 @@ def contact_arrays(
         effects: of the scene.
         types: of the kernels, from `layout`.
         grid: on which they act.
-        slots: of the barrier, if there is one.
+        slots: of each barrier.
         lanes: threads that share the joined places; see `places.coloured`.
         device: of Warp.
     """
@@ -221,11 +221,11 @@ def contact_arrays(
     if effects.turbulence:
         given["length"] = places.length
     given["slot"] = np.full(len(places), -1, dtype=np.int32)
-    if slots is not None:
-        given["slot"], given["share"] = slots.shares(places, grid.spacing)
-        given["foot"] = slots.feet(places)
+    if slots:
+        given["slot"], given["share"] = shares(slots, places, grid.spacing)
+        given["foot"] = feet(slots, places)
     shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1, "more": 1}
-    shapes |= {"taken": SLOT_SIZE * (len(slots) if slots is not None else 0), "turned": 2 * int(first[-1])}
+    shapes |= {"taken": SLOT_SIZE * sum(map(len, slots)), "turned": 2 * int(first[-1])}
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
 
 

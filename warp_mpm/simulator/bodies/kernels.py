@@ -98,9 +98,9 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         "per_mass": array(dtype=W),
         "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
         "solid": array(dtype=scalar),  # impulses of the step [N s/m]: on the solid along the normal,
-        "slot": array(dtype=wp.int32),  # of the barrier (`loads.Slots`); -1: of another body
+        "slot": array(dtype=wp.int32),  # of a barrier (`loads.Slots`); -1: of another body
         "share": array(dtype=wp.float64),  # of the impulse that goes there; the rest goes to the next slot
-        "foot": array(dtype=wp.vec2d),  # on the surface at t = 0 [m]
+        "foot": array(dtype=wp.vec2d),  # on the surface at t = 0, from the barrier's toe [m]
         "taken": array(dtype=wp.float64),  # [slots x SLOT_SIZE] sums since t = 0
         "turned": array(dtype=wp.float64),  # [surfaces x 2] sums of F_x y and F_y x of the same [N s]
         "block": array(dtype=wp.int32),  # [groups] of those that stand alone
