@@ -936,6 +936,8 @@ class Simulation:
         for name, array in self._state_arrays().items():
             array.assign(state[name])
         self._in_flow = []  # found anew
+        if self.effects.joined:
+            self._fill(self._contact_arrays["near"], 1)
         self._initial_momentum = state["initial_momentum"].tolist()
         (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
         self._since = replace(

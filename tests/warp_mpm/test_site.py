@@ -519,7 +519,9 @@ def test_a_pool_loads_the_second_barrier_as_theory_says():
     (second,) = run.summary["verdict"]["barriers"]
     checks = {check["name"]: check["value"] for check in second["checks"]}
     assert checks["overtopped_share"] == pytest.approx(0.0, abs=1e-9)
-    assert checks["overturning_factor"] == pytest.approx(2400 * 9.81 * 3.0 * 0.5 / row["heel_moment_filtered"], rel=1e-6)
+    assert checks["overturning_factor"] == pytest.approx(
+        2400 * 9.81 * 3.0 * 0.5 / row["heel_moment_filtered"], rel=1e-6
+    )
     face = run.loads.surfaces["second_face"]
     assert (face.height[0], face.height[-1], face.place[0]) == pytest.approx((0.0, 3.0, 0.0))
     assert face.pressures["normal"][-1] @ np.diff(face.edges) == pytest.approx(series["second_face_force_x"][-1])

@@ -67,6 +67,7 @@ def make_contact(
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     receive = types.scheme.receive
+    RECEIVES = types.scheme.receives
     FRICTION = effects.friction
     TURBULENCE = effects.turbulence
     CARRIED = FRICTION and LIQUID
@@ -516,6 +517,17 @@ def make_contact(
         )
 
     @wp.func
+    def flow_around(contact: Contact, r: wp.int32, grid: Grid, parameters: Parameters) -> wp.int32:
+        """1 where any of the blocks around a run of places holds material."""
+        around = contact.around[r]
+        result = wp.int32(0)
+        for i in range(around[0], around[1] + 1):
+            for j in range(around[2], around[3] + 1):
+                if read(grid.block, i * parameters.block_rows + j) != 0:
+                    result = wp.int32(1)
+        return result
+
+    @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
         wet = wp.bool(True)
@@ -577,7 +589,8 @@ def make_contact(
         reactions: wp.array(dtype=wp.float64),
     ):
         """Tell the transfer scheme, and record the impulse."""
-        give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
+        if RECEIVES:
+            give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
         force = on_body(contact, e)
         surface = read(contact.surface, e)
         for axis in range(wp.static(DIMENSIONS)):
@@ -637,18 +650,25 @@ def make_contact(
         if lane == 0:
             contact.last[0] = dt
             begin(bodies, dt, again)
-        for e in range(contact.colour[0] + lane, contact.colour[contact.colours], contact.lanes):
-            find(contact, e, bodies, grid, parameters)
-            recall(contact, e, F(again))
+        for r in range(contact.runs[0] + lane, contact.runs[contact.colours], contact.lanes):
+            near = flow_around(contact, r, grid, parameters)
+            # One that the flow has left forgets its impulses.
+            if near != 0 or read(contact.near, r) != 0:
+                for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                    find(contact, e, bodies, grid, parameters)
+                    recall(contact, e, F(again))
+            write(contact.near, r, near)
         meet()
         for c in range(contact.colours):
-            for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if read(contact.inverse, e) > F(0.0):
-                    give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
-                    if CARRIED:
-                        alone = read(contact.alone, e) / filling_ratio(contact, e, parameters)
-                        give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
-                    react(bodies, read(contact.body, e), on_body(contact, e))
+            for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                if read(contact.near, r) != 0:
+                    for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                        if read(contact.inverse, e) > F(0.0):
+                            give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
+                            if CARRIED:
+                                alone = read(contact.alone, e) / filling_ratio(contact, e, parameters)
+                                give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
+                            react(bodies, read(contact.body, e), on_body(contact, e))
             meet()
         if lane == 0:
             yield_to_flow(bodies)
@@ -658,9 +678,11 @@ def make_contact(
         while more == 1:
             for step in range(contact.colours):
                 c = wp.where(sweep % 2 == 0, step, contact.colours - 1 - step)
-                for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                    if read(contact.inverse, e) > F(0.0):
-                        relax(contact, e, bodies, grid, parameters, time_step)
+                for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                    if read(contact.near, r) != 0:
+                        for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                            if read(contact.inverse, e) > F(0.0):
+                                relax(contact, e, bodies, grid, parameters, time_step)
                 meet()
                 if SLIDING:
                     if lane == 0:
@@ -675,9 +697,11 @@ def make_contact(
                 more = contact.more[0]
                 meet()
         for c in range(contact.colours):
-            for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if read(contact.inverse, e) > F(0.0):
-                    finish(contact, e, grid, parameters, time_step, book.reactions)
+            for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                if read(contact.near, r) != 0:
+                    for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                        if read(contact.inverse, e) > F(0.0):
+                            finish(contact, e, grid, parameters, time_step, book.reactions)
             meet()
         if lane == 0:
             go_on(bodies, grid, parameters, time_step)

@@ -112,6 +112,11 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         fields |= {
             "colours": wp.int32,  # of joined places; those of one colour share no node
             "colour": array(dtype=wp.int32),  # [colours + 1] where each begins
+            # Places of a colour that follow each other are a run, and run by run those far from the flow are left out.
+            "runs": array(dtype=wp.int32),  # [colours + 1] the first run of each colour
+            "run": array(dtype=wp.int32),  # [runs + 1] where each begins
+            "around": array(dtype=wp.vec4i),  # [runs] first and last blocks along x and y that may hold its nodes
+            "near": array(dtype=wp.int32),  # [runs] 1: one of them held flow in the last step
             "lanes": wp.int32,  # threads that share the places of a colour
             "abreast": scalar,  # places of one colour on a body that slides, at most
             "last": array(dtype=wp.float64),  # [1] time step of the impulses [s]
