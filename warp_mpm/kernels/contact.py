@@ -64,6 +64,7 @@ def make_contact(
     Book = types.Book
     MOVING = effects.moving
     SLIDING = effects.sliding
+    M = types.M
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     receive = types.scheme.receive
@@ -105,6 +106,26 @@ def make_contact(
         return first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
 
     @wp.func
+    def told_around(grid: Grid, first: wp.int32, parameters: Parameters) -> wp.int32:
+        """1 where points of other materials than the flow's have told something to a block of the place's nodes."""
+        result = wp.int32(0)
+        if MATERIALS:
+            i = first / parameters.rows
+            j = first - i * parameters.rows
+            left = (i >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+            right = ((i + 2) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+            low = j >> wp.static(BLOCK_SHIFT)
+            high = (j + 2) >> wp.static(BLOCK_SHIFT)
+            if (
+                read(grid.telling, left + low) != 0
+                or read(grid.telling, right + low) != 0
+                or read(grid.telling, left + high) != 0
+                or read(grid.telling, right + high) != 0
+            ):
+                result = wp.int32(1)
+        return result
+
+    @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
         """sum N_i^2 / m_i of the solid, with weights that add up to one over the nodes that have mass; 0 where the flow
         is not at the surface: too few of the nodes have any."""
@@ -131,21 +152,31 @@ def make_contact(
             of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
-            per_mass = contact.per_mass[e]
-            for k in range(AROUND):
-                if per_mass[k] > F(0.0):
-                    node = node_of(first, k, parameters)
-                    mass = read(grid.mass, node)
-                    w = per_mass[k] * mass
-                    told = read(grid.told, node) / mass
-                    if TWO_PHASE:
-                        ratio = ratio_of_liquid(told, parameters)
-                        of_liquid += w * ratio
-                        of_liquid_twice += w * per_mass[k] * ratio
-                        drag += w * told_drag(told, parameters)
-                    if CARRIED:
-                        filled = ratio_of_filling(told, parameters)
-                        filling += w * filled
+            mixed = told_around(grid, first, parameters)
+            write(contact.mixed, e, mixed)
+            if mixed != 0:
+                per_mass = contact.per_mass[e]
+                for k in range(AROUND):
+                    if per_mass[k] > F(0.0):
+                        node = node_of(first, k, parameters)
+                        mass = read(grid.mass, node)
+                        w = per_mass[k] * mass
+                        told = read(grid.told, node) / mass
+                        if TWO_PHASE:
+                            ratio = ratio_of_liquid(told, parameters)
+                            of_liquid += w * ratio
+                            of_liquid_twice += w * per_mass[k] * ratio
+                            drag += w * told_drag(told, parameters)
+                        if CARRIED:
+                            filled = ratio_of_filling(told, parameters)
+                            filling += w * filled
+            else:
+                if TWO_PHASE:
+                    of_liquid = total * parameters.liquid_ratio
+                    of_liquid_twice = sums[0] * parameters.liquid_ratio
+                    drag = total * told_drag(M(), parameters)
+                if CARRIED:
+                    filling = total * ratio_of_filling(M(), parameters)
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
@@ -180,14 +211,17 @@ def make_contact(
         first = read(contact.first, e)
         if LIQUID_WEIGHTS:
             result = V()
-            weight = contact.weight[e]
-            for k in range(AROUND):
-                node = node_of(first, k, parameters)
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    v = read(grid.velocity, node)
-                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
-                    result += weight[k] * of_phases(solid_of(v), of_liquid * liquid_of(v))
+            if read(contact.mixed, e) != 0:
+                weight = contact.weight[e]
+                for k in range(AROUND):
+                    node = node_of(first, k, parameters)
+                    mass = read(grid.mass, node)
+                    if mass > F(0.0):
+                        v = read(grid.velocity, node)
+                        of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                        result += weight[k] * of_phases(solid_of(v), of_liquid * liquid_of(v))
+            else:
+                result = seen_at(grid.velocity, first, parameters.rows, layer_of(parameters), contact.weight, e)
         else:
             result = seen_at(grid.velocity, first, parameters.rows, layer_of(parameters), contact.weight, e)
         return result
@@ -200,13 +234,16 @@ def make_contact(
         layer = layer_of(parameters)
         if LIQUID_WEIGHTS:
             result = X()
-            weight = contact.weight[e]
-            for k in range(AROUND):
-                node = node_of(first, k, parameters)
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
-                    result += weight[k] * of_liquid * read(grid.liquid_alone, node)
+            if read(contact.mixed, e) != 0:
+                weight = contact.weight[e]
+                for k in range(AROUND):
+                    node = node_of(first, k, parameters)
+                    mass = read(grid.mass, node)
+                    if mass > F(0.0):
+                        of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                        result += weight[k] * of_liquid * read(grid.liquid_alone, node)
+            else:
+                result = seen_at(grid.liquid_alone, first, parameters.rows, layer, contact.weight, e)
         else:
             result = seen_at(grid.liquid_alone, first, parameters.rows, layer, contact.weight, e)
             if MATERIALS:

@@ -134,6 +134,7 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         if effects.liquid:
             fields["alone"] = array(dtype=scalar)  # on liquid that fills the volume, as it would move alone
     if effects.materials:
+        fields["mixed"] = array(dtype=wp.int32)  # 1: other materials than the flow's may be at the nodes
         # Means over the nodes of a place, per mass of the solid, as the parameters of these names.
         if effects.two_phase:
             fields["liquid_ratio"] = array(dtype=scalar)
