@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from analytic.force_record import cumulative_impulse, filtered_peak, moving_mean
 from warp_mpm.arrival_figures import came_beyond
+from warp_mpm.quantities.time_series import series_of_barrier
 from warp_mpm.results import Snapshots
 from warp_mpm.scenario import Scenario, Wall
 from warp_mpm.scenario.site import all_standing
 from warp_mpm.snapshot import Snapshot
+from warp_mpm.summary import load_figures
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
@@ -30,10 +32,13 @@ def barrier_figures(
 
     Each row: `name`, `x` of the toe [m]; of the horizontal force on the whole barrier `peak_force` and
     `peak_force_filtered` [N/m] with their times [s], and `impulse` [N s/m]; `face_impulse` [N s/m] on its face alone,
-    as the run's `impulse` is; `displacement` [m], `velocity` [m/s] and `work` [J/m] at the end, 0 of a fixed one;
-    `held_volume` [m³/m] at the end between the crest of the barrier before and its own; `passed_volume` [m³/m], what is
-    beyond its own then and did not lie there at the start; `landing_distance` [m], from its heel to where the first of
-    what passes it is on the ground; and `first_force_time` [s]. What is not known is None.
+    as the run's `impulse` is; of the face, too, `face_peak_force_filtered` [N/m] with its time and
+    `face_peak_force_height` [m], `pressure_patch_max` and `pore_pressure_patch_max` [Pa] with times and heights, and
+    `run_up_max` [m] with its time; `toe_moment_filtered` and `heel_moment_filtered` [N m/m] of the whole barrier with
+    their times; heights are above its own base; `displacement` [m], `velocity` [m/s] and `work` [J/m] at the end, 0 of
+    a fixed one; `held_volume` [m³/m] at the end between the crest of the barrier before and its own; `passed_volume`
+    [m³/m], what is beyond its own then and did not lie there at the start; `landing_distance` [m], from its heel to
+    where the first of what passes it is on the ground; and `first_force_time` [s]. What is not known is None.
 
     Args:
         scenario: what was run.
@@ -46,11 +51,13 @@ def barrier_figures(
     beyond = _volumes_beyond(scenario, series, snapshots)
     before = beyond.pop("inside", None)
     for name, x, barrier, standing in all_standing(scenario):
+        own = series_of_barrier(series, name)
         row: dict[str, Any] = {"name": name, "x": x} | _force_figures(series, _force_on(series, name))
-        row["face_impulse"] = _impulse(series, "impact_force_x" if name == "barrier" else f"{name}_face_force_x")
+        row["face_impulse"] = _impulse(own, "impact_force_x")
+        row |= _load_figures(own)
         moving = {"displacement": "barrier_displacement", "velocity": "barrier_velocity", "work": "barrier_work"}
         for figure, column in moving.items():
-            values = series.get(column if name == "barrier" else f"{name}_{column}")
+            values = own.get(column)
             fixed = name != "barrier" and _kind(scenario, name) == "fixed"
             row[figure] = 0.0 if fixed else None if values is None else float(values[-1])
         there = beyond.get(name)
@@ -65,6 +72,24 @@ def barrier_figures(
 
 def _kind(scenario: Scenario, name: str) -> str:
     return next(one.motion.kind for one in scenario.barriers if one.name == name)
+
+
+def _load_figures(series: Series) -> dict[str, float | None]:
+    """Where a barrier is loaded most, from its series; None of what that does not tell."""
+    loads = load_figures(series)
+    found = {"face_peak_force_height": loads.pop("peak_force_height")} | loads
+    face = _force_figures(series, series.get("impact_force_x"))
+    for figure in ("peak_force_filtered", "peak_force_filtered_time"):
+        found[f"face_{figure}"] = face[figure]
+    for name in ("pressure_patch", "pore_pressure_patch", "run_up"):
+        values, height = series.get(name), series.get(f"{name}_height")
+        at = None if values is None else int(np.argmax(values))
+        greatest = None if at is None or values is None else float(values[at])
+        found[f"{name}_max"] = greatest
+        found[f"{name}_max_time"] = float(series["time"][at]) if greatest else None
+        if name != "run_up":
+            found[f"{name}_max_height"] = float(height[at]) if greatest and height is not None else None
+    return found
 
 
 def _force_on(series: Series, name: str) -> Array | None:

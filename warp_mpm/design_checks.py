@@ -7,21 +7,22 @@ factor. `docs/how_to/design_checks.md` has every formula with its source.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.empirical import reflected_depth_ratio
-from analytic.force_record import RESIDUAL_SHARE, moving_mean
+from analytic.force_record import RESIDUAL_SHARE, cumulative_impulse, moving_mean
 from warp_mpm import geometry
 from warp_mpm.arrival_figures import came_beyond, departed_volume
 from warp_mpm.quantities import Quantity
 from warp_mpm.quantities.quantity import FORCE, VOLUME
-from warp_mpm.scenario import Design, Fixed, FurtherBarrier, OutlineShape, Scenario, Sliding, Trapezoid
-from warp_mpm.scenario.site import standing_outline
+from warp_mpm.quantities.time_series import OF_BARRIER, series_of_barrier
+from warp_mpm.scenario import Barrier, Design, Fixed, OutlineShape, Scenario, Sliding, Trapezoid
+from warp_mpm.scenario.site import all_standing
 
 Array = NDArray[np.float64]
 Series = Mapping[str, Array]
@@ -136,19 +137,11 @@ def verdict(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> d
     Returns:
         `holds` (None where nothing could be judged), `checks` (name, value, time, limit, holds, formula; all but the
         names and formulas None where they are not known), `told` and `guidelines` (name, value, formula), `remarks`,
-        sentences, and of a scene with further barriers `barriers` (name, checks), which `holds` counts too.
+        sentences, and of a scene with further barriers `barriers` (name, checks, told), which `holds` counts too.
     """
     design = scenario.design
     if design is None or scenario.barrier is None:
         return None
-    remarks: list[str] = []
-    values: dict[str, tuple[float | None, float | None]] = {
-        "displacement": (figures.get("barrier_displacement_final"), None)
-    }
-    if figures.get("barrier_at_rest") is False:
-        remarks.append("The barrier still slides at the end of the run: its displacement is not final.")
-    values |= _stability(scenario, design, series, remarks)
-    values |= _overtopping(scenario, figures)
     limits: dict[str, float | None] = {
         "displacement": design.displacement_m,
         "sliding_factor": design.sliding_factor,
@@ -160,58 +153,99 @@ def verdict(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> d
         "overtopped_volume": design.overtopped_volume_m3_per_m,
         "freeboard": design.freeboard_m,
     }  # fmt: skip
-    checks = [_judged(CHECKS[name], *values[name], limits[name]) for name in CHECKS if name in values]
-    answers = [check["holds"] for check in checks if check["limit"] is not None]
-    for name, limit in limits.items():
-        if limit is not None and name not in values:
-            remarks.append(f"{CHECKS[name].words}: not known of this scene.")
-            answers.append(None)
-    for check in checks:
-        if check["name"] == "displacement" and check["holds"] and figures.get("barrier_at_rest") is False:
-            check["holds"] = None
-            answers.append(None)
-    further = [_further(scenario, design, one, series, limits) for one in scenario.barriers]
-    answers += [check["holds"] for one in further for check in one["checks"] if check["limit"] is not None]
-    if further:
-        remarks.append(FURTHER)
+    remarks: list[str] = []
+    answers: list[bool | None] = []
+    judged: dict[str, dict[str, Any]] = {}
+    for one in _all(scenario, series, figures):
+        checks = _checks(scenario, design, one, limits)
+        answers += [check["holds"] for check in checks if check["limit"] is not None]
+        told = [_said(TOLD[name], value) for name, value in _told(scenario, one).items()]
+        for name, limit in limits.items():
+            if limit is not None and all(check["name"] != name for check in checks):
+                one.remarks.append(f"{CHECKS[name].words}: not known of this scene.")
+                answers.append(None)
+        remarks += one.remarks if one.name == BARRIER else [f"Barrier {one.name}: {said}" for said in one.remarks]
+        judged[one.name] = {"checks": checks, "told": told}
+    first = judged.pop(BARRIER)
     return {
         "holds": False if False in answers else None if None in answers or not answers else True,
-        "checks": checks,
-        "told": [_said(TOLD[name], value) for name, value in _told(scenario, series, figures).items()],
+        "checks": first["checks"],
+        "told": first["told"],
         "guidelines": [_said(GUIDELINES[name], _guideline(scenario, name)) for name in design.guidelines],
         "remarks": remarks,
-        **({"barriers": further} if further else {}),
+        **({"barriers": [{"name": name} | found for name, found in judged.items()]} if judged else {}),
     }
 
 
-FURTHER = (
-    "Of the further barriers sliding and displacement alone are judged, with the same limits: their moments, run-up "
-    "and what went over each are not."
-)
+BARRIER = "barrier"
+"""Name of the first barrier."""
 
 
-def _further(
-    scenario: Scenario, design: Design, one: FurtherBarrier, series: Series, limits: Mapping[str, float | None]
+@dataclass(frozen=True)
+class _Judged:
+    """A barrier that is judged."""
+
+    name: str
+    barrier: Barrier
+    standing: Array | None
+    """`standing_outline`."""
+    series: Series
+    """What acted on it and how it moved, by the names that the columns of the first barrier have."""
+    figures: Mapping[str, Any]
+    """Key figures of it, by the names that those of the first barrier have."""
+    remarks: list[str] = field(default_factory=list)
+
+
+def _all(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> list[_Judged]:
+    """All barriers of a scene, the first one first."""
+    rows = {row["name"]: row for row in figures.get("barriers", ())}
+    found = []
+    for name, _, barrier, standing in all_standing(scenario):
+        own, known = series_of_barrier(series, name), figures
+        if name != BARRIER:
+            known = _further_figures(scenario, barrier, own, rows.get(name, {}), figures)
+        found.append(_Judged(name, barrier, standing, own, known))
+    return sorted(found, key=lambda one: one.name != BARRIER)
+
+
+def _further_figures(
+    scenario: Scenario, barrier: Barrier, series: Series, row: Mapping[str, Any], figures: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Name and checks of one of the further barriers."""
-    moves = not isinstance(one.motion, Fixed)
+    """Key figures of a further barrier by the names that the first one's have; `row` is that of `barrier_figures`."""
+    time, force, run_up = series["time"], series.get("impact_force_x"), series.get("run_up")
+    found: dict[str, Any] = {"barrier_displacement_final": 0.0 if isinstance(barrier.motion, Fixed) else None}
+    found |= {name: figures.get(name) for name in ("left_volume", "end_time")}
+    if "barrier_displacement" in series:
+        found["barrier_displacement_final"] = float(series["barrier_displacement"][-1])
+    if isinstance(barrier.motion, Sliding) and "barrier_velocity" in series:
+        found["barrier_at_rest"] = bool(series["barrier_velocity"][-1] == 0.0)
+    found["overtopped_volume"] = row.get("passed_volume")
+    if run_up is not None:
+        highest = int(np.argmax(run_up))
+        found["run_up_max"], found["run_up_max_time"] = float(run_up[highest]), float(time[highest])
+    if force is not None and len(time) > 1 and force.max() > 0.0:
+        impulse, tenth = cumulative_impulse(time, force), RESIDUAL_SHARE * float(time[-1] - time[0])
+        found["residual_force"] = float(impulse[-1] - np.interp(time[-1] - tenth, time, impulse)) / tenth
+    return found
+
+
+def _checks(
+    scenario: Scenario, design: Design, one: _Judged, limits: Mapping[str, float | None]
+) -> list[dict[str, Any]]:
+    """All checks of a barrier that are known."""
+    displacement, at_rest = one.figures.get("barrier_displacement_final"), one.figures.get("barrier_at_rest")
     values: dict[str, tuple[float | None, float | None]] = {}
-    displacement = series.get(f"{one.name}_barrier_displacement")
-    if not moves or displacement is not None:
-        values["displacement"] = (float(displacement[-1]) if moves and displacement is not None else 0.0, None)
-    friction = one.motion.base_friction_coefficient if isinstance(one.motion, Sliding) else design.base_friction
-    mass = one.mass
-    if mass is None and design.density_kg_per_m3 is not None and isinstance(one.shape, Trapezoid):
-        mass = design.density_kg_per_m3 * geometry.area(one.shape.outline)
-    recorded = all(f"{one.name}_force_{axis}" in series for axis in "xy") and len(series["time"]) > 1
-    if friction is not None and mass is not None and recorded:
-        values["sliding_factor"] = _sliding_factor(scenario, design, series, f"{one.name}_force", (mass, friction))
-    checks = [_judged(CHECKS[name], *value, limits[name]) for name, value in values.items()]
-    velocity = series.get(f"{one.name}_barrier_velocity")
+    if one.name == BARRIER or displacement is not None:
+        values["displacement"] = (displacement, None)
+    if at_rest is False:
+        one.remarks.append("The barrier still slides at the end of the run: its displacement is not final.")
+    values |= _stability(scenario, design, one)
+    values |= _overtopping(scenario, one)
+    checks = [_judged(CHECKS[name], *values[name], limits[name]) for name in CHECKS if name in values]
     for check in checks:
-        if check["name"] == "displacement" and check["holds"] and velocity is not None and velocity[-1] != 0.0:
+        if check["name"] == "displacement" and check["holds"] and at_rest is False:
             check["holds"] = None
-    return {"name": one.name, "checks": checks}
+    return checks
 
 
 def _sliding_factor(
@@ -262,10 +296,9 @@ class _Block:
     """tan δ_b."""
 
 
-def _block(scenario: Scenario, design: Design) -> _Block | str:
+def _block(scenario: Scenario, design: Design, one: _Judged) -> _Block | str:
     """The block, or why it is not known."""
-    barrier = scenario.barrier
-    assert barrier is not None
+    barrier, standing = one.barrier, one.standing
     assert isinstance(barrier.shape, Trapezoid)
     friction, density = design.base_friction, design.density_kg_per_m3
     mass = None if density is None else density * geometry.area(barrier.shape.outline)
@@ -273,9 +306,8 @@ def _block(scenario: Scenario, design: Design) -> _Block | str:
         mass, friction = barrier.mass, barrier.motion.base_friction_coefficient
     if mass is None:
         return "The barrier has no weight: design.density_kg_per_m3 is needed for its stability."
-    standing = standing_outline(barrier, 0.0, scenario.ground)
     assert standing is not None
-    if abs(standing[-1, 1]) > 1e-6 * float(np.ptp(standing)):
+    if abs(standing[-1, 1] - standing[0, 1]) > 1e-6 * float(np.ptp(standing)):
         return "The barrier's base is not level: its stability is not judged."
     base, crest, height = barrier.shape.base_crest_height
     arm, middle = 0.5 * base, height / 3.0 * (base + 2.0 * crest) / (base + crest)
@@ -285,22 +317,20 @@ def _block(scenario: Scenario, design: Design) -> _Block | str:
     return _Block(mass * scenario.gravity.acceleration_m_per_s2, base, arm, middle, friction)
 
 
-def _stability(
-    scenario: Scenario, design: Design, series: Series, remarks: list[str]
-) -> dict[str, tuple[float | None, float | None]]:
+def _stability(scenario: Scenario, design: Design, one: _Judged) -> dict[str, tuple[float | None, float | None]]:
     """Factors of safety, eccentricity and base pressure: the worst over time, with its time [s]."""
-    assert scenario.barrier is not None
-    if not isinstance(scenario.barrier.shape, Trapezoid):
-        return _sliding_of_wall(scenario, design, series, remarks)
+    series, remarks = one.series, one.remarks
+    if not isinstance(one.barrier.shape, Trapezoid):
+        return _sliding_of_wall(scenario, design, one)
     needed = [f"{name}_force_{axis}" for name in ("impact", "back") for axis in "xy"]
     needed += ["top_force", "top_force_y", "heel_moment"]
-    block = _block(scenario, design)
+    block = _block(scenario, design, one)
     if isinstance(block, str):
         remarks.append(block)
         return {}
     missing = [name for name in needed if name not in series]
     if missing or len(series["time"]) < 2:
-        remarks.append(f"The barrier's stability is not known without {', '.join(missing) or 'samples'}.")
+        remarks.append(_unknown(one, missing))
         return {}
     time, tilt, factor = series["time"], math.radians(scenario.gravity.tilt_deg), design.load_factor
     mean = {name: factor * moving_mean(time, series[name]) for name in needed}
@@ -309,7 +339,7 @@ def _stability(
     normal = down - (mean["impact_force_y"] + mean["top_force_y"] + mean["back_force_y"])
     overturning = mean["heel_moment"] + along * block.middle
     if design.boulder is not None:
-        push, height = _boulder_push(scenario, design)
+        push, height = _boulder_push(scenario, design, one.barrier)
         across, overturning = across + push, overturning + push * height
     found: dict[str, tuple[float | None, float | None]] = {}
     if block.friction is None:
@@ -330,12 +360,9 @@ def _stability(
     return found
 
 
-def _sliding_of_wall(
-    scenario: Scenario, design: Design, series: Series, remarks: list[str]
-) -> dict[str, tuple[float | None, float | None]]:
+def _sliding_of_wall(scenario: Scenario, design: Design, one: _Judged) -> dict[str, tuple[float | None, float | None]]:
     """The factor of sliding of a wall without end, by its mass; it has no base to turn over or to press with."""
-    barrier = scenario.barrier
-    assert barrier is not None
+    barrier, series, remarks = one.barrier, one.series, one.remarks
     if not isinstance(barrier.motion, Sliding):
         remarks.append(
             "A wall without end that does not slide has neither weight nor base: its stability is not judged."
@@ -344,12 +371,18 @@ def _sliding_of_wall(
     remarks.append("A wall without end has no base: only its sliding is judged, by its mass.")
     missing = [name for name in ("impact_force_x", "impact_force_y") if name not in series]
     if missing or len(series["time"]) < 2:
-        remarks.append(f"The barrier's stability is not known without {', '.join(missing) or 'samples'}.")
+        remarks.append(_unknown(one, missing))
         return {}
     assert barrier.mass is not None
     block = (barrier.mass, barrier.motion.base_friction_coefficient)
-    boulder = 0.0 if design.boulder is None else _boulder_push(scenario, design)[0]
+    boulder = 0.0 if design.boulder is None else _boulder_push(scenario, design, barrier)[0]
     return {"sliding_factor": _sliding_factor(scenario, design, series, "impact_force", block, boulder)}
+
+
+def _unknown(one: _Judged, missing: Sequence[str]) -> str:
+    """That its stability is not known without columns, by the names of the first barrier's."""
+    own = missing if one.name == BARRIER else [f"{one.name}_{OF_BARRIER[name]}" for name in missing]
+    return f"The barrier's stability is not known without {', '.join(own) or 'samples'}."
 
 
 def _least(time: Array, withstands: Array, load: Array) -> tuple[float | None, float | None]:
@@ -368,12 +401,11 @@ def _greatest(time: Array, values: Array) -> tuple[float | None, float | None]:
     return (float(values[worst]) if math.isfinite(values[worst]) else None), float(time[worst])
 
 
-def _boulder_push(scenario: Scenario, design: Design) -> tuple[float, float]:
+def _boulder_push(scenario: Scenario, design: Design, barrier: Barrier) -> tuple[float, float]:
     """Load per metre [N/m], with its partial factor, and the height at which it acts [m]."""
     boulder = design.boulder
     assert boulder is not None
-    assert scenario.barrier is not None
-    shape = scenario.barrier.shape
+    shape = barrier.shape
     crest = shape.base_crest_height[2] if isinstance(shape, Trapezoid) else math.inf
     height = min(boulder.height_m if boulder.height_m is not None else scenario.flow.depth, crest)
     return design.load_factor * boulder_force(scenario, design) / boulder.width_m, height
@@ -387,26 +419,29 @@ def boulder_force(scenario: Scenario, design: Design) -> float:
     return 1e3 * boulder.load_factor * 4000.0 * speed**1.2 * boulder.radius_m**2
 
 
-def _overtopping(scenario: Scenario, figures: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
-    assert scenario.barrier is not None
+def _overtopping(scenario: Scenario, one: _Judged) -> dict[str, tuple[float | None, float | None]]:
+    figures, shape = one.figures, one.barrier.shape
     found: dict[str, tuple[float | None, float | None]] = {}
-    if not isinstance(scenario.barrier.shape, Trapezoid):
+    if not isinstance(shape, Trapezoid):
         # Nothing gets over a wall without end; what left the domain did so elsewhere.
         return {"overtopped_share": (0.0, None), "overtopped_volume": (0.0, None), "freeboard": (None, None)}
     beyond, left = figures.get("overtopped_volume"), departed_volume(scenario, figures)
     if beyond is not None:
-        volume = came_beyond(scenario, float(beyond), scenario.barrier.shape.crest_end)
+        volume = float(beyond)
+        if one.name == BARRIER:  # of the further ones that is told already
+            volume = came_beyond(scenario, volume, shape.crest_end)
         volume += max(float(left or 0.0), 0.0)  # on the safe side: it may have left upstream
         found["overtopped_share"] = (volume / scenario.flow.volume, None)
         found["overtopped_volume"] = (volume, None)
     if figures.get("run_up_max") is not None:
-        height = scenario.barrier.shape.base_crest_height[2]
+        height = shape.base_crest_height[2]
         found["freeboard"] = (height - float(figures["run_up_max"]), figures.get("run_up_max_time"))
     return found
 
 
-def _told(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> dict[str, float]:
-    """Loads and bounds beside the checks."""
+def _told(scenario: Scenario, one: _Judged) -> dict[str, float]:
+    """Loads and bounds beside the checks; those of the flow at the start with the first barrier."""
+    series, figures = one.series, one.figures
     flow, tilt = scenario.flow, math.radians(scenario.gravity.tilt_deg)
     g = scenario.gravity.acceleration_m_per_s2
     found: dict[str, float] = {}
@@ -420,11 +455,13 @@ def _told(scenario: Scenario, series: Series, figures: Mapping[str, Any]) -> dic
     if "run_up" in series:
         reached = float(series["run_up"][last].mean())
         found["hydrostatic_load"] = 0.5 * flow.material.density * g * math.cos(tilt) * reached**2
+    if one.name != BARRIER:
+        return found
     if g > 0.0:
         found["energy_head"] = flow.depth + flow.speed**2 / (2.0 * g)
         froude = flow.speed / math.sqrt(g * flow.depth)
         found["reflected_depth"] = float(reflected_depth_ratio(froude)) * flow.depth
-        shape = scenario.barrier.shape if scenario.barrier is not None else None
+        shape = one.barrier.shape
         if isinstance(shape, Trapezoid) and flow.speed > 0.0 and math.cos(tilt) > 0.0:
             crest, cosine, slope = shape.base_crest_height[2], math.cos(tilt), math.tan(tilt)
             square = flow.speed**2
@@ -459,6 +496,10 @@ def verdict_rows(verdict: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows += [(f"  {CHECKS[entry['name']].words}", _answer_row(entry)) for entry in verdict["checks"]]
     for one in verdict.get("barriers", ()):
         rows += [(f"  {one['name']}: {CHECKS[entry['name']].words}", _answer_row(entry)) for entry in one["checks"]]
+        rows += [
+            (f"  {one['name']}: {TOLD[entry['name']].words.strip()}", TOLD[entry["name"]].text(entry["value"]))
+            for entry in one["told"]
+        ]
     for table, part in ((TOLD, "told"), (GUIDELINES, "guidelines")):
         rows += [
             (f"  {table[entry['name']].words}", table[entry["name"]].text(entry["value"])) for entry in verdict[part]

@@ -165,7 +165,7 @@ class Snapshots:
 
 @dataclass(frozen=True)
 class SurfaceLoads:
-    """What acted on a surface of the barrier, in n slots, at T times; pressures are means over the interval."""
+    """What acted on a surface of a barrier, in n slots, at T times; pressures are means over the interval."""
 
     edges: Array
     """[n + 1] of the slots, along the surface [m]."""
@@ -180,12 +180,13 @@ class SurfaceLoads:
 
 @dataclass(frozen=True)
 class Loads:
-    """Loads on the barrier by height and time."""
+    """Loads on the barriers by height and time."""
 
     times: Array
     """[T] ends of the intervals [s]."""
     surfaces: Mapping[str, SurfaceLoads]
-    """`impact`, `top` and `back`, those that the barrier has."""
+    """`impact`, `top` and `back`, those that the barrier has, and `NAME_face`, `NAME_top` and `NAME_back` of each
+    further one."""
 
 
 def read_loads(path: str | Path) -> Loads:
@@ -198,7 +199,9 @@ def read_loads(path: str | Path) -> Loads:
     try:
         with h5py.File(path, "r", locking=False) as file:
             rows = int(file.attrs["rows"])
-            names = [name for name in ("impact", "top", "back") if name in file]
+            groups = [name for name in file if isinstance(file[name], h5py.Group)]
+            names = [name for name in ("impact", "top", "back") if name in groups]
+            names += [name for name in groups if name not in names]
             surfaces = {
                 name: SurfaceLoads(
                     file[name]["edges"][()],

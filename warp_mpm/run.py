@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from warp_mpm.arrival_figures import arrival_figures, with_what_arrives
 from warp_mpm.barrier_figures import barrier_figures
 from warp_mpm.caveats import run_caveats, scene_caveats
+from warp_mpm.design_checks import verdict
 from warp_mpm.quantities import recorded_quantities
 from warp_mpm.quantities.time_series import OWN
 from warp_mpm.recording import (
@@ -390,8 +391,12 @@ def evaluate(path: str | Path, *, pictures: bool = True) -> dict[str, Any]:
 def _summary(
     scenario: Scenario, series: Mapping[str, NDArray[np.float64]], snapshots: Any, record: dict[str, Any]
 ) -> dict[str, Any]:
-    summary = summarize(scenario, with_what_arrives(scenario, series), snapshots, _of_the_run(record))
-    return summary | arrival_figures(scenario, series, summary) | barrier_figures(scenario, series, snapshots)
+    balanced = with_what_arrives(scenario, series)
+    summary = summarize(scenario, balanced, snapshots, _of_the_run(record))
+    barriers = barrier_figures(scenario, series, snapshots)
+    if barriers:  # what passed each of several
+        summary["verdict"] = verdict(scenario, balanced, summary | barriers)
+    return summary | arrival_figures(scenario, series, summary) | barriers
 
 
 def _draw(results: Results, path: Path) -> None:

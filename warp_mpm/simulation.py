@@ -124,9 +124,9 @@ class Simulation:
         """All that the flow meets, in the order in which they act on it."""
         _check_names(self.bodies)
         self.slots = slots_of(scenario, self.bodies)
-        """The barrier's surfaces, divided; None without a barrier."""
-        if self.slots is not None:
-            self._patches = Patches.along(self.slots.face, scenario.output.pressure_patch_m)
+        """The surfaces of each barrier, divided, by its name."""
+        length = scenario.output.pressure_patch_m
+        self._patches = {name: Patches.along(slots.face, length) for name, slots in self.slots.items()}
         self.effects = derive_effects(scenario).with_bodies(effects_of(self.bodies))
         if channel is not None:
             self.effects = replace(self.effects, dimensions=3)
@@ -171,7 +171,7 @@ class Simulation:
                 self.grid,
                 initial,
                 bodies=self.bodies,
-                slots=self.slots,
+                slots=self.slots.values(),
                 liquid_stiffness=stiffness_of_liquid(scenario, initial.material),
                 of_materials=of_materials,
                 device=self.device,
@@ -406,12 +406,12 @@ class Simulation:
         Pressures on a patch are means over `output.pressure_patch_s`: where that is longer than the caller's intervals,
         `Window.after` keeps what is needed of the marks before.
         """
-        if self._barrier is None:
+        if not self.slots:
             return Window(self._clock_entry(at.TIME), self._read("reactions").tolist())
         return Window(
             self._clock_entry(at.TIME),
             self._read("reactions").tolist(),
-            self._held.number_of(self._barrier, "base_impulse"),
+            self._held.number_of(self._barrier, "base_impulse") if self._barrier is not None else 0.0,
             self._read("turned").tolist(),
             self._read("taken").copy(),
             reach=self.scenario.output.pressure_patch_s,
@@ -465,9 +465,10 @@ class Simulation:
     def _now(self, now: Window, since: Window, sums: Sequence[float]) -> Now:
         barrier = self._motion_of(self._barrier) if self._barrier is not None else BarrierNow()
         forces, base_force = mean_forces(self.bodies, now, since)
-        loads = (
-            None if self.slots is None else LoadsNow(self.scenario, self.bodies, self.slots, self._patches, now, since)
-        )
+        loads = {
+            name: LoadsNow(self.scenario, self.bodies, slots, self._patches[name], now, since)
+            for name, slots in self.slots.items()
+        }
         return Now(
             scenario=self.scenario,
             bodies=self.bodies,
@@ -478,7 +479,8 @@ class Simulation:
             elapsed=now.time - since.time,
             forces=forces,
             base_force=base_force,
-            loads=loads,
+            loads=loads.get(BARRIER),
+            loads_on=loads,
             impulses=now.reactions,
             initial_momentum=self._initial_momentum,
             points=self.points,
@@ -530,6 +532,8 @@ class Simulation:
         for name, array in self._held.state.items():
             array.assign(state[name])
         self._stepping.forget_the_flow()
+        if self.effects.joined:
+            self._fill(self._contact_arrays["near"], 1)
         self._initial_momentum = state["initial_momentum"].tolist()
         (begin, base_impulse), reactions, turned, taken = (state[f"interval.{name}"] for name in INTERVAL)
         self._since = replace(

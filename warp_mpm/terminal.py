@@ -141,6 +141,10 @@ def _barrier_row(row: Mapping[str, Any]) -> str:
     if row["peak_force_filtered"] is not None:
         when = "" if row["peak_force_filtered_time"] is None else f" at {row['peak_force_filtered_time']:.3f} s"
         parts.append(FIGURES["peak_force_filtered"].text(row["peak_force_filtered"], ",.1f") + when)
+    if row["heel_moment_filtered"]:
+        parts.append(FIGURES["heel_moment_filtered"].text(row["heel_moment_filtered"], ",.1f") + " about its heel")
+    if row["pressure_patch_max"]:
+        parts.append(FIGURES["pressure_patch_max"].text(row["pressure_patch_max"], ",.1f") + " on the face")
     if row["displacement"]:
         parts.append(f"moved {row['displacement']:.2f} m")
     if row["held_volume"] is not None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from warp_mpm.effect_rules import derive_effects, effect_rules, with_law
-from warp_mpm.performance import arrival, two_devices
+from warp_mpm.grid import fit_grid
+from warp_mpm.performance import arrival, site, two_devices
 from warp_mpm.performance.benchmark import OWN_FIELDS, SHORT, _ladder
 from warp_mpm.performance.chart import effects_chart
 from warp_mpm.performance.probe import Stepper, in_turns
@@ -15,6 +16,8 @@ from warp_mpm.performance.whole_runs import recording_shares
 from warp_mpm.performance.yardstick import Yardstick
 from warp_mpm.plotting import save
 from warp_mpm.simulation import Simulation
+from warp_mpm.simulator.bodies.arrays import effects_of
+from warp_mpm.simulator.bodies.of_scene import scene_bodies
 from warp_mpm.simulator.laws import LAWS
 
 
@@ -26,6 +29,23 @@ def test_the_yardstick_conserves_momentum():
     np.testing.assert_allclose(after.sum(axis=0), before.sum(axis=0), atol=1e-13)
     assert after.std() < 0.7 * before.std()
     assert yardstick.chunk(0.01) > 0.0
+
+
+def test_a_site_is_priced_one_thing_at_a_time(load_scene):
+    """Each scene has the effects of the one that it is set against, and what its name says."""
+    found = site.scenes(load_scene("case_1").replaced(SHORT))
+    effects = {name: derive_effects(scene).with_bodies(effects_of(scene_bodies(scene, fit_grid(scene))))
+               for name, (scene, _) in found.items()}  # fmt: skip
+    added = {
+        name: {field for field, value in vars(effects[name]).items() if value != getattr(effects[beside], field)}
+        for name, (_, beside) in found.items() if beside is not None
+    }  # fmt: skip
+    assert list(added.values()) == [{"joined"}, {"joined", "profile"}, {"materials"}, {"materials", "kinds"}]
+    volumes = [scene.flow.volume for scene, _ in found.values()]
+    assert volumes[1:3] == pytest.approx([volumes[0]] * 2)
+    assert volumes[4:] == pytest.approx([volumes[3]] * 2)
+    tilted, turned = (found[name][0] for name in list(found)[:2])
+    assert np.hypot(*turned.flow.velocity_m_per_s) == pytest.approx(np.hypot(*tilted.flow.velocity_m_per_s))
 
 
 class Known:

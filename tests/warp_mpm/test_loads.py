@@ -31,7 +31,7 @@ DENSITY = 1800.0
 def normal_of(simulation, since=None):
     """Total impulses [n] on the slots of the face since a mark, along their normal."""
     taken = np.array(simulation.window().taken) - (np.array(since.taken) if since else 0.0)
-    taken = taken.reshape(-1, at.SLOT_SIZE)[simulation.slots.face.slots]
+    taken = taken.reshape(-1, at.SLOT_SIZE)[simulation.slots["barrier"].face.slots]
     return taken[:, at.SLOT_NORMAL] + (taken[:, at.SLOT_LIQUID] if simulation.effects.two_phase else 0.0)
 
 
@@ -68,7 +68,7 @@ def test_pressure_at_rest_is_a_triangle():
     simulation.advance(0.1)
     mark = simulation.window()
     simulation.advance(0.5)
-    heights = simulation.slots.face.heights
+    heights = simulation.slots["barrier"].face.heights
     pressure = normal_of(simulation, mark) / np.diff(heights) / (simulation.time - mark.time)
     middle = 0.5 * (heights[1:] + heights[:-1])
     inside = middle < DEPTH - 0.25  # at the surface the splines reach into the next cell
@@ -95,9 +95,9 @@ def test_slots_add_up_to_the_reactions(load_scene, name):
     window = simulation.window()
     taken = np.array(window.taken).reshape(-1, at.SLOT_SIZE)
     names = [surface.name for body in simulation.bodies for surface in body.surfaces]
-    pieces = simulation.bodies[simulation.slots.body].outline.segments
+    pieces = simulation.bodies[simulation.slots["barrier"].body].outline.segments
     pressed = 0.0
-    for stretch in simulation.slots.stretches:
+    for stretch in simulation.slots["barrier"].stretches:
         normal, liquid, along = taken[stretch.slots].sum(axis=0)
         total = normal + (liquid if simulation.effects.two_phase else 0.0)
         k = names.index(stretch.surface)
@@ -124,8 +124,8 @@ def test_a_state_fits_a_longer_run_before_a_wall(load_scene, changes):
         Simulation(load_scene("case_5", **{"numerics.spacing_m": 0.75, "output.end_time_s": end} | changes))
         for end in (0.5, 5.0)
     )
-    assert len(short.slots) == len(long.slots)
-    assert short.slots.face.heights.tolist() == long.slots.face.heights.tolist()
+    assert len(short.slots["barrier"]) == len(long.slots["barrier"])
+    assert short.slots["barrier"].face.heights.tolist() == long.slots["barrier"].face.heights.tolist()
 
 
 def test_what_the_flow_does_not_touch_takes_nothing(load_scene):
@@ -178,7 +178,7 @@ def loads_of(load_scene, pressure, times, **changes):
         | changes,
     )
     bodies = Simulation(scenario).bodies
-    slots = slots_of(scenario, bodies)
+    slots = slots_of(scenario, bodies)["barrier"]
     surfaces = sum(len(body.surfaces) for body in bodies)
     patches = Patches.along(slots.face, scenario.output.pressure_patch_m)
     middle = 0.5 * (slots.face.edges[1:] + slots.face.edges[:-1])

@@ -25,7 +25,7 @@ from warp_mpm.simulator.bodies.arrays import effects_of, pieces_by_column
 from warp_mpm.simulator.bodies.kernels import RUBBED
 from warp_mpm.simulator.bodies.outline import Segments
 from warp_mpm.snapshot import Snapshot
-from warp_mpm.validation.scenes import material
+from warp_mpm.validation.scenes import INVISCID, material
 
 SLOPE = [[-40, 12], [-20, 6], [0, 0], [15, 0], [20, -2], [40, -4]]
 DAM = {
@@ -483,6 +483,50 @@ def test_several_barriers_have_forces_motion_and_figures_of_their_own(two):
     assert barrier_figures(two.scenario.replaced({"barriers": []}), series, None) == {}
 
 
+def test_a_pool_loads_the_second_barrier_as_theory_says():
+    """Water at rest on a terrace between two upright dams: ρ g h²/2 on the second one's face, at a third of the depth;
+    moments about its own toe and heel, heights above its own base, 4 m below the first one's."""
+    depth, dam = 2.0, DAM | {"shape": DAM["shape"] | {"base_width_m": 1.0, "height_m": 3.0}, "friction": 0.0}
+    scene = site(
+        barrier=dam,
+        barriers=[dam | {"name": "second", "x_m": 26}],
+        ground={"friction": 0.2, "profile_m": [[-40, 12], [-20, 6], [0, 0], [15, 0], [20, -4], [40, -4]]},
+        flow={"formulation": "undrained", "material": material("undrained") | INVISCID,
+              "lateral_stress_coefficient": 1.0, "velocity_m_per_s": [0, 0],
+              "shape": {"kind": "polygon", "vertices_m": [[20, -4], [26, -4], [26, depth - 4], [17.5, depth - 4]]}},
+        output={"end_time_s": 0.6, "time_series_interval_s": 0.02, "loads_by_height": True},
+        design={"density_kg_per_m3": 2400, "overturning_factor": 1.5, "base_friction": 0.5, "overtopped_share": 0.1},
+    )  # fmt: skip
+    run = run_in_memory(scene, make_simulation=Simulation)
+    series, weight = run.time_series, 9.81 * scene.flow.material.density
+    later = series["time"] > 0.2
+    thrust = weight * depth**2 / 2
+    names = ("force_x", "face_force_x", "toe_moment", "heel_moment", "face_pressure_patch", "face_run_up")
+    found = {name: float(series[f"second_{name}"][later].mean()) for name in names}
+    height = found["toe_moment"] / found["face_force_x"]
+    assert found["force_x"] == pytest.approx(thrust, rel=0.02)
+    assert found["toe_moment"] == pytest.approx(thrust * depth / 3, rel=0.04)
+    assert found["heel_moment"] == pytest.approx(found["toe_moment"], rel=1e-9)  # an upright face is not lifted
+    assert series["second_face_force_height"][later].mean() == pytest.approx(height, rel=1e-3)
+    assert found["face_pressure_patch"] == pytest.approx(weight * (depth - 0.25), rel=0.05)
+    assert found["face_run_up"] == pytest.approx(depth, abs=0.5)
+    assert not series["toe_moment"].any()
+    row = run.summary["barriers"][1]
+    assert row["face_peak_force_height"] == pytest.approx(depth / 3, rel=0.1)
+    assert row["toe_moment_filtered"] == pytest.approx(found["toe_moment"], rel=0.2)
+    assert row["pressure_patch_max_height"] == pytest.approx(0.25)
+    assert row["run_up_max"] == pytest.approx(depth, abs=0.5)
+    (second,) = run.summary["verdict"]["barriers"]
+    checks = {check["name"]: check["value"] for check in second["checks"]}
+    assert checks["overtopped_share"] == pytest.approx(0.0, abs=1e-9)
+    assert checks["overturning_factor"] == pytest.approx(
+        2400 * 9.81 * 3.0 * 0.5 / row["heel_moment_filtered"], rel=1e-6
+    )
+    face = run.loads.surfaces["second_face"]
+    assert (face.height[0], face.height[-1], face.place[0]) == pytest.approx((0.0, 3.0, 0.0))
+    assert face.pressures["normal"][-1] @ np.diff(face.edges) == pytest.approx(series["second_face_force_x"][-1])
+
+
 def test_what_a_barrier_has_left_behind_has_not_landed_beyond_it(two):
     """The heel is where the barrier has got to: what lies where it stood is upstream of it."""
     scenario, heel = two.scenario, float(all_standing(two.scenario)[1][-1][:, 0].max())
@@ -505,7 +549,7 @@ def test_slots_of_a_face_with_a_lip_add_up_to_its_reactions(two):
     simulation.advance(0.8)
     window = simulation.window()
     taken = np.array(window.taken).reshape(-1, at.SLOT_SIZE)
-    face = simulation.slots.face
+    face = simulation.slots["barrier"].face
     assert face.heights[0] == pytest.approx(0.0)
     assert face.heights[-1] == pytest.approx(1.5)
     # Upstream of the toe the lip leans out; its underside lifts, and the sum of what presses is more than along x.

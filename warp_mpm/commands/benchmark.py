@@ -55,8 +55,18 @@ def benchmark(
     from rich.table import Table as Shown
 
     with refusals():
-        from warp_mpm.performance.benchmark import CASE, effect_costs, law_costs, machine, speed_tables
+        from warp_mpm.performance.benchmark import (
+            CASE,
+            ROUNDS,
+            SHORT,
+            TURN,
+            effect_costs,
+            law_costs,
+            machine,
+            speed_tables,
+        )
         from warp_mpm.performance.chart import effects_chart
+        from warp_mpm.performance.site import site_costs
         from warp_mpm.performance.table import Table as Made
         from warp_mpm.performance.table import put_into_page
         from warp_mpm.plotting import save
@@ -88,6 +98,7 @@ def benchmark(
             columns = ("effects, one more each", "yardsticks", "added", "ns per point and step")
             tables = [Made("effects", "Cost of each effect, added to those above it", columns, rows)]
             tables.append(law_costs(base, device=device, progress=told))
+            tables.append(site_costs(base.replaced(SHORT), device=device, progress=told, rounds=ROUNDS, seconds=TURN))
             if out is not None:
                 save(effects_chart(costs), out / "effects.png")
         for table in tables:

@@ -64,9 +64,11 @@ def make_contact(
     Book = types.Book
     MOVING = effects.moving
     SLIDING = effects.sliding
+    M = types.M
     TWO_PHASE = effects.two_phase
     LIQUID = effects.liquid
     receive = types.scheme.receive
+    RECEIVES = types.scheme.receives
     FRICTION = effects.friction
     TURBULENCE = effects.turbulence
     CARRIED = FRICTION and LIQUID
@@ -104,6 +106,26 @@ def make_contact(
         return first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
 
     @wp.func
+    def told_around(grid: Grid, first: wp.int32, parameters: Parameters) -> wp.int32:
+        """1 where points of other materials than the flow's have told something to a block of the place's nodes."""
+        result = wp.int32(0)
+        if MATERIALS:
+            i = first / parameters.rows
+            j = first - i * parameters.rows
+            left = (i >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+            right = ((i + 2) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+            low = j >> wp.static(BLOCK_SHIFT)
+            high = (j + 2) >> wp.static(BLOCK_SHIFT)
+            if (
+                read(grid.telling, left + low) != 0
+                or read(grid.telling, right + low) != 0
+                or read(grid.telling, left + high) != 0
+                or read(grid.telling, right + high) != 0
+            ):
+                result = wp.int32(1)
+        return result
+
+    @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
         """sum N_i^2 / m_i of the solid, with weights that add up to one over the nodes that have mass; 0 where the flow
         is not at the surface: too few of the nodes have any."""
@@ -130,21 +152,31 @@ def make_contact(
             of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
-            per_mass = contact.per_mass[e]
-            for k in range(AROUND):
-                if per_mass[k] > F(0.0):
-                    node = node_of(first, k, parameters)
-                    mass = read(grid.mass, node)
-                    w = per_mass[k] * mass
-                    told = read(grid.told, node) / mass
-                    if TWO_PHASE:
-                        ratio = ratio_of_liquid(told, parameters)
-                        of_liquid += w * ratio
-                        of_liquid_twice += w * per_mass[k] * ratio
-                        drag += w * told_drag(told, parameters)
-                    if CARRIED:
-                        filled = ratio_of_filling(told, parameters)
-                        filling += w * filled
+            mixed = told_around(grid, first, parameters)
+            write(contact.mixed, e, mixed)
+            if mixed != 0:
+                per_mass = contact.per_mass[e]
+                for k in range(AROUND):
+                    if per_mass[k] > F(0.0):
+                        node = node_of(first, k, parameters)
+                        mass = read(grid.mass, node)
+                        w = per_mass[k] * mass
+                        told = read(grid.told, node) / mass
+                        if TWO_PHASE:
+                            ratio = ratio_of_liquid(told, parameters)
+                            of_liquid += w * ratio
+                            of_liquid_twice += w * per_mass[k] * ratio
+                            drag += w * told_drag(told, parameters)
+                        if CARRIED:
+                            filled = ratio_of_filling(told, parameters)
+                            filling += w * filled
+            else:
+                if TWO_PHASE:
+                    of_liquid = total * parameters.liquid_ratio
+                    of_liquid_twice = sums[0] * parameters.liquid_ratio
+                    drag = total * told_drag(M(), parameters)
+                if CARRIED:
+                    filling = total * ratio_of_filling(M(), parameters)
             # With means of this kind the nodes get all of an impulse, and no more. Where there is no liquid, one that
             # weighs next to nothing stands in for it.
             inverse_total = F(1.0) / larger(total, F(wp.static(WEIGHTLESS)))
@@ -179,14 +211,17 @@ def make_contact(
         first = read(contact.first, e)
         if LIQUID_WEIGHTS:
             result = V()
-            weight = contact.weight[e]
-            for k in range(AROUND):
-                node = node_of(first, k, parameters)
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    v = read(grid.velocity, node)
-                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
-                    result += weight[k] * of_phases(solid_of(v), of_liquid * liquid_of(v))
+            if read(contact.mixed, e) != 0:
+                weight = contact.weight[e]
+                for k in range(AROUND):
+                    node = node_of(first, k, parameters)
+                    mass = read(grid.mass, node)
+                    if mass > F(0.0):
+                        v = read(grid.velocity, node)
+                        of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                        result += weight[k] * of_phases(solid_of(v), of_liquid * liquid_of(v))
+            else:
+                result = seen_at(grid.velocity, first, parameters.rows, layer_of(parameters), contact.weight, e)
         else:
             result = seen_at(grid.velocity, first, parameters.rows, layer_of(parameters), contact.weight, e)
         return result
@@ -199,13 +234,16 @@ def make_contact(
         layer = layer_of(parameters)
         if LIQUID_WEIGHTS:
             result = X()
-            weight = contact.weight[e]
-            for k in range(AROUND):
-                node = node_of(first, k, parameters)
-                mass = read(grid.mass, node)
-                if mass > F(0.0):
-                    of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
-                    result += weight[k] * of_liquid * read(grid.liquid_alone, node)
+            if read(contact.mixed, e) != 0:
+                weight = contact.weight[e]
+                for k in range(AROUND):
+                    node = node_of(first, k, parameters)
+                    mass = read(grid.mass, node)
+                    if mass > F(0.0):
+                        of_liquid = ratio_of_liquid(read(grid.told, node) / mass, parameters) / contact.liquid_ratio[e]
+                        result += weight[k] * of_liquid * read(grid.liquid_alone, node)
+            else:
+                result = seen_at(grid.liquid_alone, first, parameters.rows, layer, contact.weight, e)
         else:
             result = seen_at(grid.liquid_alone, first, parameters.rows, layer, contact.weight, e)
             if MATERIALS:
@@ -516,6 +554,17 @@ def make_contact(
         )
 
     @wp.func
+    def flow_around(contact: Contact, r: wp.int32, grid: Grid, parameters: Parameters) -> wp.int32:
+        """1 where any of the blocks around a run of places holds material."""
+        around = contact.around[r]
+        result = wp.int32(0)
+        for i in range(around[0], around[1] + 1):
+            for j in range(around[2], around[3] + 1):
+                if read(grid.block, i * parameters.block_rows + j) != 0:
+                    result = wp.int32(1)
+        return result
+
+    @wp.func
     def find(contact: Contact, e: wp.int32, bodies: Bodies, grid: Grid, parameters: Parameters):
         """The nodes of a place, and what they weigh."""
         wet = wp.bool(True)
@@ -577,7 +626,8 @@ def make_contact(
         reactions: wp.array(dtype=wp.float64),
     ):
         """Tell the transfer scheme, and record the impulse."""
-        give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
+        if RECEIVES:
+            give_scheme(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
         force = on_body(contact, e)
         surface = read(contact.surface, e)
         for axis in range(wp.static(DIMENSIONS)):
@@ -637,18 +687,25 @@ def make_contact(
         if lane == 0:
             contact.last[0] = dt
             begin(bodies, dt, again)
-        for e in range(contact.colour[0] + lane, contact.colour[contact.colours], contact.lanes):
-            find(contact, e, bodies, grid, parameters)
-            recall(contact, e, F(again))
+        for r in range(contact.runs[0] + lane, contact.runs[contact.colours], contact.lanes):
+            near = flow_around(contact, r, grid, parameters)
+            # One that the flow has left forgets its impulses.
+            if near != 0 or read(contact.near, r) != 0:
+                for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                    find(contact, e, bodies, grid, parameters)
+                    recall(contact, e, F(again))
+            write(contact.near, r, near)
         meet()
         for c in range(contact.colours):
-            for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if read(contact.inverse, e) > F(0.0):
-                    give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
-                    if CARRIED:
-                        alone = read(contact.alone, e) / filling_ratio(contact, e, parameters)
-                        give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
-                    react(bodies, read(contact.body, e), on_body(contact, e))
+            for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                if read(contact.near, r) != 0:
+                    for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                        if read(contact.inverse, e) > F(0.0):
+                            give(contact, e, whole(contact, e, parameters, time_step), grid, parameters)
+                            if CARRIED:
+                                alone = read(contact.alone, e) / filling_ratio(contact, e, parameters)
+                                give_alone(contact, e, alone * read(contact.normal, e), grid, parameters)
+                            react(bodies, read(contact.body, e), on_body(contact, e))
             meet()
         if lane == 0:
             yield_to_flow(bodies)
@@ -658,9 +715,11 @@ def make_contact(
         while more == 1:
             for step in range(contact.colours):
                 c = wp.where(sweep % 2 == 0, step, contact.colours - 1 - step)
-                for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                    if read(contact.inverse, e) > F(0.0):
-                        relax(contact, e, bodies, grid, parameters, time_step)
+                for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                    if read(contact.near, r) != 0:
+                        for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                            if read(contact.inverse, e) > F(0.0):
+                                relax(contact, e, bodies, grid, parameters, time_step)
                 meet()
                 if SLIDING:
                     if lane == 0:
@@ -675,9 +734,11 @@ def make_contact(
                 more = contact.more[0]
                 meet()
         for c in range(contact.colours):
-            for e in range(contact.colour[c] + lane, contact.colour[c + 1], contact.lanes):
-                if read(contact.inverse, e) > F(0.0):
-                    finish(contact, e, grid, parameters, time_step, book.reactions)
+            for r in range(contact.runs[c] + lane, contact.runs[c + 1], contact.lanes):
+                if read(contact.near, r) != 0:
+                    for e in range(read(contact.run, r), read(contact.run, r + 1)):
+                        if read(contact.inverse, e) > F(0.0):
+                            finish(contact, e, grid, parameters, time_step, book.reactions)
             meet()
         if lane == 0:
             go_on(bodies, grid, parameters, time_step)

@@ -249,9 +249,9 @@ _ROWS = (
     Figure(
         "barriers", "-",
         "of a scene with further barriers: a row for each, from upstream to downstream, with the force on the whole of "
-        "it, its impulse and that of its face alone, its motion, the volumes held before its crest at the end and "
-        "passed beyond it, and how far from its heel the "
-        "first of what passed was on the ground (docs/how_to/site.md)",
+        "it, its impulse and that of its face alone, greatest moments, the height of the force, greatest pressures and "
+        "run-up on its face, its motion, the volumes held before its crest at the end and passed beyond it, and how "
+        "far from its heel the first of what passed was on the ground (docs/how_to/site.md)",
         number=False,
     ),
     Figure(

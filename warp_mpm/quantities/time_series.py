@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from .quantity import ENERGY, FORCE, IMPULSE, MASS, MOMENT, Quantity, Sampled
@@ -93,34 +94,131 @@ def force_of_surface(surface: str, axis: str) -> Sampled:
     return Sampled(name, FORCE, meaning, words, read=_force(surface, axis), of_points=False, mean=True)
 
 
-FURTHER = {
-    "barrier_displacement": ("m", "displacement of the barrier {name} along x", "displacement of {name}"),
-    "barrier_velocity": ("m/s", "velocity of the barrier {name} along x", "velocity of {name}"),
-    "barrier_work": (ENERGY, "work done by the flow on the barrier {name} since t = 0", "work done on {name}"),
-}
-"""What is told of each further barrier that moves: unit, meaning, words; its columns are `NAME_barrier_displacement`
-and so on."""
+@dataclass(frozen=True)
+class OfFurther:
+    """What is told of each further barrier beside its forces: a column `NAME_barrier_work`, and so on."""
+
+    unit: str
+    meaning: str
+    """With {name} for the barrier's name."""
+    words: str
+    read: Callable[[Any, str], float]
+    """From a `Now`, of the barrier of that name."""
+    there: Callable[[Any, Any], bool] = lambda scenario, one: True
+    """Whether a scenario tells it of one of its further barriers."""
+    of_loads: bool = False
+    mean: bool = False
+
+
+def _moves(scenario: Any, one: Any) -> bool:
+    return bool(one.motion.kind != "fixed")
+
+
+def _tells_liquid(scenario: Any, one: Any) -> bool:
+    return two_phases(scenario) or (liquid(scenario) and one.friction.face > 0.0)
+
+
+FURTHER: Mapping[str, OfFurther] = {
+    "barrier_displacement": OfFurther(
+        "m", "displacement of the barrier {name} along x", "displacement of {name}",
+        lambda now, name: now.further[name].displacement, _moves,
+    ),
+    "barrier_velocity": OfFurther(
+        "m/s", "velocity of the barrier {name} along x", "velocity of {name}",
+        lambda now, name: now.further[name].velocity, _moves,
+    ),
+    "barrier_work": OfFurther(
+        ENERGY, "work done by the flow on the barrier {name} since t = 0", "work done on {name}",
+        lambda now, name: now.further[name].work, _moves,
+    ),
+    "face_force_height": OfFurther(
+        "m", "impact_force_height of the barrier {name}, above its base", "height of the force on the face of {name}",
+        lambda now, name: now.loads_on[name].height_of(f"{name}_face", now.forces[f"{name}_face"][0]), of_loads=True,
+    ),
+    "toe_moment": OfFurther(
+        MOMENT, "toe_moment of the barrier {name}, about its toe", "moment on {name} about its toe",
+        lambda now, name: now.loads_on[name].toe_moment, of_loads=True, mean=True,
+    ),
+    "heel_moment": OfFurther(
+        MOMENT, "heel_moment of the barrier {name}, about its heel", "moment on {name} about its heel",
+        lambda now, name: now.loads_on[name].heel_moment(now.forces[name]),
+        lambda scenario, one: bool(one.shape.kind != "wall"), of_loads=True, mean=True,
+    ),
+    "face_pore_pressure_patch": OfFurther(
+        "Pa", "pore_pressure_patch of the barrier {name}", "pore pressure on a patch of the face of {name}",
+        lambda now, name: now.loads_on[name].pore_pressure_patch.pressure, _tells_liquid, of_loads=True,
+    ),
+    "face_pore_pressure_patch_height": OfFurther(
+        "m", "pore_pressure_patch_height of the barrier {name}, above its base",
+        "height of the patch of greatest pore pressure on {name}",
+        lambda now, name: now.loads_on[name].pore_pressure_patch.height, _tells_liquid, of_loads=True,
+    ),
+    "face_pressure_patch": OfFurther(
+        "Pa", "pressure_patch of the barrier {name}", "pressure on a patch of the face of {name}",
+        lambda now, name: now.loads_on[name].pressure_patch.pressure, of_loads=True,
+    ),
+    "face_pressure_patch_height": OfFurther(
+        "m", "pressure_patch_height of the barrier {name}, above its base",
+        "height of the patch of greatest pressure on {name}",
+        lambda now, name: now.loads_on[name].pressure_patch.height, of_loads=True,
+    ),
+    "face_run_up": OfFurther(
+        "m", "run_up of the barrier {name}, above its base", "run-up on {name}",
+        lambda now, name: now.loads_on[name].run_up, of_loads=True,
+    ),
+}  # fmt: skip
+"""By the end of the column's name."""
 
 
 def of_further_barrier(name: str, what: str) -> Sampled:
     """A row of `FURTHER` of the barrier `name`."""
-    unit, meaning, words = (text.format(name=name) for text in FURTHER[what])
-    field = what.removeprefix("barrier_")
+    row = FURTHER[what]
+    meaning, words = (text.format(name=name) for text in (row.meaning, row.words))
     return Sampled(
-        f"{name}_{what}", unit, meaning, words,
-        read=lambda now: getattr(now.further[name], field), of_points=False,
+        f"{name}_{what}", row.unit, meaning, words, read=lambda now: row.read(now, name),
+        of_points=False, of_loads=row.of_loads, mean=row.mean,
     )  # fmt: skip
 
 
 def further_quantities(scenario: Any) -> dict[str, Sampled]:
-    """What a scene tells of its further barriers, by key: force on the whole of each, and how it moves."""
+    """What a scene tells of its further barriers, by key: force on the whole of each, where it acts, and how it
+    moves."""
     found: dict[str, Sampled] = {}
     for one in getattr(scenario, "barriers", ()):
         rows = [force_of_surface(one.name, axis) for axis in "xy"]
-        if one.motion.kind != "fixed":
-            rows += [of_further_barrier(one.name, what) for what in FURTHER]
+        rows += [of_further_barrier(one.name, what) for what, row in FURTHER.items() if row.there(scenario, one)]
         found |= {row.key: row for row in rows}
     return found
+
+
+OF_BARRIER: Mapping[str, str] = {
+    "impact_force_x": "face_force_x",
+    "impact_force_y": "face_force_y",
+    "top_force": "top_force_x",
+    "top_force_y": "top_force_y",
+    "back_force_x": "back_force_x",
+    "back_force_y": "back_force_y",
+    "impact_force_height": "face_force_height",
+    "toe_moment": "toe_moment",
+    "heel_moment": "heel_moment",
+    "pressure_patch": "face_pressure_patch",
+    "pressure_patch_height": "face_pressure_patch_height",
+    "pore_pressure_patch": "face_pore_pressure_patch",
+    "pore_pressure_patch_height": "face_pore_pressure_patch_height",
+    "run_up": "face_run_up",
+    "barrier_velocity": "barrier_velocity",
+    "barrier_displacement": "barrier_displacement",
+    "barrier_work": "barrier_work",
+}
+"""Columns of the first barrier, and how those of a further one end that tell the same."""
+
+
+def series_of_barrier(series: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """What a time series tells of one of a scene's barriers, by the names of the columns of the first one."""
+    if name == "barrier":
+        return dict(series)
+    columns = {"time": "time"} | {first: f"{name}_{end}" for first, end in OF_BARRIER.items()}
+    return {first: series[column] for first, column in columns.items() if column in series}
 
 
 _ROWS = (
@@ -193,41 +291,44 @@ _ROWS = (
         "heel_moment", MOMENT,
         "moment of the flow on the whole barrier about its heel; mean over the interval; + overturns it",
         "moment about the heel", "M_heel", there=ended_barrier, of_points=False, of_loads=True, mean=True,
-        read=lambda now: now.loads.heel_moment(sum(now.forces[name][1] for name in ("impact", "top", "back"))),
+        read=lambda now: now.loads.heel_moment(now.forces["barrier"]),
     ),
     Sampled(
         "pressure_patch", "Pa",
         "greatest mean of the total normal pressure over output.pressure_patch_m of the impacted face and the last "
         "output.pressure_patch_s, or the interval where that is longer; on an inclined face each piece of a cell's "
         "length first gives half of its load to its neighbours",
-        "pressure on a patch of the face", "p", read=lambda now: now.loads.pressure_patch.pressure, there=barrier,
-        of_points=False, of_loads=True,
+        "pressure on a patch of the face", "p", read=lambda now: now.loads.pressure_patch.pressure,
+        there=barrier, of_points=False, of_loads=True,
     ),
     Sampled(
         "pressure_patch_height", "m",
         "height above the barrier's base of the middle of the patch of greatest pressure; 0 without pressure",
-        "height of the patch of greatest pressure", read=lambda now: now.loads.pressure_patch.height, there=barrier,
-        of_points=False, of_loads=True,
+        "height of the patch of greatest pressure", read=lambda now: now.loads.pressure_patch.height,
+        there=barrier, of_points=False, of_loads=True,
     ),
     Sampled(
         "pore_pressure_patch", "Pa",
         "greatest mean of the liquid's pressure over output.pressure_patch_m of the impacted face and the last "
         "output.pressure_patch_s, or the interval where that is longer; on an inclined face shared as pressure_patch "
         "is",
-        "pore pressure on a patch of the face", "p_L", read=lambda now: now.loads.pore_pressure_patch.pressure,
+        "pore pressure on a patch of the face", "p_L",
+        read=lambda now: now.loads.pore_pressure_patch.pressure,
         there=pressed_by_liquid, of_points=False, of_loads=True,
     ),
     Sampled(
         "pore_pressure_patch_height", "m",
         "height above the barrier's base of the middle of the patch of greatest pore pressure; 0 without pressure",
-        "height of the patch of greatest pore pressure", read=lambda now: now.loads.pore_pressure_patch.height,
+        "height of the patch of greatest pore pressure",
+        read=lambda now: now.loads.pore_pressure_patch.height,
         there=pressed_by_liquid, of_points=False, of_loads=True,
     ),
     Sampled(
         "run_up", "m",
         "height above the barrier's base up to which the flow presses on the impacted face with a tenth at least of "
         "rho g h, h its depth at the start; of the mean over the last output.pressure_patch_s",
-        "run-up on the face", "h_r", read=lambda now: now.loads.run_up, there=barrier, of_points=False, of_loads=True,
+        "run-up on the face", "h_r", read=lambda now: now.loads.run_up, there=barrier, of_points=False,
+        of_loads=True,
     ),
     Sampled(
         "barrier_velocity", "m/s", "velocity of the barrier along x, v_2", "barrier velocity", "v₂",

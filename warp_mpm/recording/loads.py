@@ -1,9 +1,9 @@
-"""Loads on the barrier by height and time, in an HDF5 file: what presses and rubs where, slot by slot.
+"""Loads on the barriers by height and time, in an HDF5 file: what presses and rubs where, slot by slot.
 
 One group for each surface: `edges` [n + 1] along it from its lower or upstream end, `height` and `place` [n + 1] of the
-same above the base and downstream of the toe, and a row of n means over the interval for each time. Times are those of
-the time series, so that forces of both add up. Room for all rows is laid down at the start, as for the snapshots: a
-process that is killed leaves a file that opens.
+same above the base and downstream of the toe of its barrier, and a row of n means over the interval for each time.
+Times are those of the time series, so that forces of both add up. Room for all rows is laid down at the start, as for
+the snapshots: a process that is killed leaves a file that opens.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class LoadsRecorder:
             if self._rows == 0:
                 self._lay_out(simulation)
             assert self._file is not None
-            for stretch in simulation.slots.stretches:
+            for stretch in stretches_of(simulation):
                 rows = pressures(mean[stretch.slots], stretch, simulation.scenario)
                 for name, values in rows.items():
                     self._file[stretch.surface][name][self._rows] = values
@@ -116,7 +116,7 @@ class LoadsRecorder:
         assert self._file is not None
         file, room, chunk = self._file, self._room, min(self._room, LARGEST_CHUNK)
         set_aside(file, "time", (room,), chunk=chunk).attrs["unit"] = "s"
-        for stretch in simulation.slots.stretches:
+        for stretch in stretches_of(simulation):
             group = file.create_group(stretch.surface)
             x, y = stretch.place(stretch.edges).T
             for name, values in (("edges", stretch.edges), ("place", x), ("height", y)):
@@ -139,6 +139,11 @@ class LoadsRecorder:
             finally:
                 file, self._file = self._file, None
                 file.close()
+
+
+def stretches_of(simulation: Any) -> list[Stretch]:
+    """The surfaces of all barriers, those of the first one first."""
+    return [stretch for slots in simulation.slots.values() for stretch in slots.stretches]
 
 
 def mean_on_slots(window: Any, before: tuple[float, np.ndarray] | None) -> tuple[np.ndarray, tuple[float, np.ndarray]]:
@@ -168,8 +173,6 @@ def pressures(mean: np.ndarray, stretch: Stretch, scenario: Any) -> dict[str, np
     if two_phases(scenario):
         pore = liquid / scenario.flow.material.porosity
         return {"normal": normal + liquid, "liquid": liquid, "shear": along, "pore_pressure": pore}
-    friction = scenario.barrier.friction
-    rough = {"impact": friction.face, "top": friction.top, "back": friction.back}[stretch.surface] > 0.0
     found = {"normal": normal, "shear": along}
     # Of one phase the liquid's pressure is found for friction alone.
-    return found | ({"pore_pressure": liquid} if rough and holds_liquid(scenario) else {})
+    return found | ({"pore_pressure": liquid} if stretch.rubs and holds_liquid(scenario) else {})

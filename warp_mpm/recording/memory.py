@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mpm.quantities import TIME_SERIES
-from warp_mpm.recording.loads import mean_on_slots, pressures
+from warp_mpm.recording.loads import mean_on_slots, pressures, stretches_of
 from warp_mpm.recording.schedule import Schedule
 from warp_mpm.simulator.bodies.loads import Stretch
 from warp_mpm.snapshot import Snapshot, snapshot_of
@@ -61,7 +61,7 @@ class SeriesInMemory:
 
 
 class LoadsInMemory:
-    """Keeps mean pressures on the slots of the barrier, as in `loads.h5`."""
+    """Keeps mean pressures on the slots of the barriers, as in `loads.h5`."""
 
     def __init__(self, schedule: Schedule):
         self.schedule = schedule
@@ -75,7 +75,7 @@ class LoadsInMemory:
         """Keep one row."""
         window = simulation.window()
         mean, self._before = mean_on_slots(window, self._before)
-        self.stretches = tuple(simulation.slots.stretches)
+        self.stretches = tuple(stretches_of(simulation))
         self.times.append(simulation.time)
         self._rows.append(
             {

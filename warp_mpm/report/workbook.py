@@ -141,11 +141,13 @@ def _verdict(names: Sequence[str], verdicts: Sequence[Mapping[str, Any] | None])
             answer = "" if entry["limit"] is None else _answer(entry["holds"])
             words = f"{barrier}{check.words}"
             rows.append([run, words, check.shown_unit, *scaled, side, entry["time"], answer, check.formula])
-        for table, part in ((TOLD, "told"), (GUIDELINES, "guidelines")):
-            for entry in verdict[part]:
+        beside = [("", TOLD, verdict["told"]), ("", GUIDELINES, verdict["guidelines"])]
+        beside += [(f"{one['name']}: ", TOLD, one["told"]) for one in verdict.get("barriers", ())]
+        for barrier, table, entries in beside:
+            for entry in entries:
                 told = table[entry["name"]]
-                value = entry["value"] * told.factor
-                rows.append([run, told.words.strip(), told.shown_unit, value, None, "", None, "", told.formula])
+                words, value = f"{barrier}{told.words.strip()}", entry["value"] * told.factor
+                rows.append([run, words, told.shown_unit, value, None, "", None, "", told.formula])
         rows += [[run, sentence, "", None, None, "", None, "", ""] for sentence in verdict["remarks"]]
     return rows
 

@@ -1,4 +1,4 @@
-"""Where the flow acts on the barrier at the time of a sample: resultant, moments, pressure on a patch of the face."""
+"""Where the flow acts on a barrier at the time of a sample: resultant, moments, pressure on a patch of the face."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import layout as at
-from ..scenario import Scenario, Trapezoid
+from ..scenario import Scenario
 from ..simulator.bodies import Body
 from ..simulator.bodies.loads import Patches, Slots
 from .samples import Window
@@ -33,7 +33,7 @@ class Patch:
 
 @dataclass(frozen=True)
 class LoadsNow:
-    """Loads on the barrier between two marks."""
+    """Loads on a barrier between two marks."""
 
     scenario: Scenario
     bodies: Sequence[Body]
@@ -66,12 +66,11 @@ class LoadsNow:
         """Mean moment [N m/m] of all forces of the flow on the barrier about its toe; + turns it downstream."""
         return sum(across - up for across, up in self._turning.values())
 
-    def heel_moment(self, vertical: float) -> float:
-        """The same about its heel, of a barrier that has one, with the mean `vertical` force [N/m] on it."""
-        assert self.scenario.barrier is not None
-        shape = self.scenario.barrier.shape
-        assert isinstance(shape, Trapezoid)
-        return self.toe_moment + vertical * shape.base_crest_height[0]
+    def heel_moment(self, force: tuple[float, ...]) -> float:
+        """The same about its heel, of a barrier that has one, with the mean `force` on it along the axes [N/m]."""
+        assert self.slots.heel is not None
+        x, y = self.slots.heel
+        return self.toe_moment + force[1] * x - force[0] * y
 
     @cached_property
     def _sums(self) -> Array:

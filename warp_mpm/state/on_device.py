@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -36,7 +36,7 @@ ARRIVED = ("conveyed", "inflow")
 """Arrays of an inflow that change during a run."""
 
 LOADS = ("taken", "turned")
-"""Sums of the barrier's slots and surfaces since t = 0."""
+"""Sums of the barriers' slots and surfaces since t = 0."""
 
 
 class OnDevice:
@@ -49,7 +49,7 @@ class OnDevice:
         grid: the nodes.
         initial: the material points at the start.
         bodies: all that the flow meets.
-        slots: the barrier's surfaces, divided; None without a barrier.
+        slots: the surfaces of each barrier, divided.
         liquid_stiffness: as in `arrays.point_arrays`.
         of_materials: parameters of the kernels for each material.
         device: where the arrays lie.
@@ -64,7 +64,7 @@ class OnDevice:
         initial: MaterialPoints,
         *,
         bodies: Sequence[Body],
-        slots: Slots | None,
+        slots: Collection[Slots],
         liquid_stiffness: NDArray[np.float64],
         of_materials: Sequence[Any],
         device: Any,
@@ -137,7 +137,7 @@ class OnDevice:
         # Corner sums and the rest of the grid are rebuilt every step; only the blocks in use are remembered.
         kept = ("clock", "counters", "limiters", "reactions", "left", "balance")
         arrays |= {name: self.clock[name] for name in kept} | {"grid.shift": self.nodes["shift"]}
-        if self._slots is not None:
+        if self._slots:
             arrays |= {f"contact.{name}": self.contact[name] for name in LOADS}
         arrays |= {f"arrival.{name}": self.arrival[name] for name in ARRIVED if name in self.arrival}
         arrays |= {f"bodies.{name}": array for name, array in self.bodies.items() if name in STATE_OF_BODIES}

@@ -43,9 +43,10 @@ class Window:
     base_impulse: float = 0.0
     """Of friction at the barrier's base [N s/m]."""
     turned: Sequence[float] = ()
-    """Sums of F_x y and F_y x on each surface of the barrier, one after the other [N s]; nil on other bodies."""
+    """Sums of F_x y and F_y x on each surface of a barrier, from its toe, one after the other [N s]; nil on other
+    bodies."""
     taken: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    """Of each slot of the barrier (`simulator.bodies.loads`), one after the other, as in `layout.SLOT_...` [N s/m]."""
+    """Of each slot of the barriers (`simulator.bodies.loads`), one after the other, as in `layout.SLOT_...` [N s/m]."""
     trail: Sequence[tuple[float, NDArray[np.float64]]] = ()
     """Times [s] before this one and what `taken` was then, the latest last."""
     reach: float = 0.0
@@ -121,6 +122,8 @@ class Now:
     """Mean friction at the base of a sliding barrier, against its motion [N/m]."""
     loads: Any
     """Where the flow acts on the barrier (`state.loads.LoadsNow`); None without one."""
+    loads_on: Mapping[str, Any]
+    """The same of every barrier, by its name."""
     impulses: Sequence[float]
     """Of the flow on all surfaces since t = 0, along x and y in turn [N s/m]."""
     initial_momentum: Sequence[float]

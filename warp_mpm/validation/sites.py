@@ -44,25 +44,28 @@ def _both(corners: Corners, slope: float, ends: tuple[float, float], top: float,
     return [tilted, tilted.replaced(profile)]
 
 
-def _ways(scenes: list[Scenario], slopes: tuple[float, float], times: Array, front: bool) -> list[Array]:
-    """Way [times] down the slope of the centre of mass, or of the front, the 98th hundredth of the mass, in each."""
+PARTS = 1000
+FRONT = 979
+"""Parts of equal mass, and the number of the one that is told as the front: 98 % lie behind its end."""
+
+
+def _ways(scenes: list[Scenario], slopes: tuple[float, float], times: Array) -> list[Array]:
+    """Way [times, PARTS] down the slope of the flow's parts of equal mass, from behind to front, in each."""
     found = []
     for scenario, slope in zip(scenes, slopes, strict=True):
         simulation = Simulation(scenario)
 
-        def place(simulation: Simulation = simulation, slope: float = slope) -> float:
+        def places(simulation: Simulation = simulation, slope: float = slope) -> Array:
             points = simulation.points()
             way = _along(points["position"], slope)
-            if not front:
-                return float(np.average(way, weights=points["solid_mass"]))
             order = np.argsort(way)
             behind = np.cumsum(points["solid_mass"][order])
-            return float(np.interp(0.98 * behind[-1], behind, way[order]))
+            return np.asarray(np.interp(np.arange(1, PARTS + 1) / PARTS * behind[-1], behind, way[order]))
 
-        start, moved = place(), []
+        start, moved = places(), []
         for time in times:
             simulation.advance(float(time))
-            moved.append(place() - start)
+            moved.append(places() - start)
         found.append(np.array(moved))
     return found
 
@@ -79,7 +82,7 @@ def profile(quick: bool) -> Outcome:
         for spacing in ladder:
             options: dict[str, Any] = {"formulation": "dry", "end_time": 1.0, "lateral": 0.0, "soil": STIFF}
             scenes = _both(box(-2.0, 0.0, 0.4), slope, (-4.0, 6.0), 1.0, ground=friction, spacing_m=spacing, **options)
-            _, ours = _ways(scenes, (0.0, slope), times, front=False)
+            ours = _ways(scenes, (0.0, slope), times)[1].mean(axis=1)
             checks.append(compared(f"block, {slope:g}°, {spacing:g} m: way after 1 s", "m", ours[-1], exact[-1], 0.01))
             block.append(Curve(times, ours, f"{slope:g}°, {spacing:g} m", "o" if spacing == ladder[-1] else "x"))
     water: list[Curve] = []
@@ -96,9 +99,14 @@ def profile(quick: bool) -> Outcome:
                 soil=INVISCID | {"liquid_bulk_modulus_Pa": 3e6},
                 spacing_m=spacing,
             )
-            tilted, ours = _ways(scenes, (0.0, slope), times, front=True)
+            both = _ways(scenes, (0.0, slope), times)
+            tilted, ours = (ways[:, FRONT] for ways in both)
             name = f"dam break, {slope:g}°, {spacing:g} m"
-            checks.append(compared(f"{name}: way of the front after {times[-1]:g} s", "m", ours[-1], tilted[-1], 0.02))
+            apart = float(np.abs(both[1][-1] - both[0][-1]).mean())
+            checks += [
+                at_most(f"{name}: distance of the mass from where it should lie", "m", apart, 0.25 * spacing),
+                compared(f"{name}: way of the front after {times[-1]:g} s", "m", ours[-1], tilted[-1], 0.02),
+            ]
             if spacing == 0.125:
                 water += [
                     reference(times, tilted, "gravity tilted" if not water else ""),
@@ -186,9 +194,12 @@ CASES = (
     Case(
         name="profile",
         title="Slopes as a profile of the ground",
-        tests="A stiff block that slides, and a dam break of a perfect fluid, on slopes that the grid does not follow.",
+        tests="A stiff block that slides, and a dam break of a perfect fluid, on slopes that the grid does not follow. "
+        "The mean distance of the mass from where it lies under tilted gravity falls with the cell. It was added when "
+        "the front's error was seen not to fall: that is of a film thinner than a cell, whose last points lie some "
+        "tenths of a cell here or there.",
         source="½ g (sin θ − μ cos θ) t²; the same dam break under gravity tilted by the slope.",
-        limit="1 % of the block's way, 2 % of the front's.",
+        limit="1 % of the block's way, a quarter of a cell of the mass's distance, 2 % of the front's way.",
         run=profile,
         in_quick=False,
     ),

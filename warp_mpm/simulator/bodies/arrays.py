@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from warp_mpm.effects import Effects
 from warp_mpm.grid import GridLayout
-from warp_mpm.kernels.layout import SLOT_SIZE
+from warp_mpm.kernels.layout import BLOCK, SLOT_SIZE
 
 from .body import Body, Driven, Sliding
 from .kernels import NEAR
-from .loads import Slots
+from .loads import Slots, feet, shares
 from .outline import ENDLESS, FEW, Segments
 from .places import Places, by_block, coloured, neighbours, places_of, sharing
 
@@ -167,7 +167,7 @@ def contact_arrays(
     types: SimpleNamespace,
     grid: GridLayout,
     *,
-    slots: Slots | None,
+    slots: Collection[Slots],
     lanes: int,
     device: Any,
 ) -> Group:
@@ -178,7 +178,7 @@ def contact_arrays(
         effects: of the scene.
         types: of the kernels, from `layout`.
         grid: on which they act.
-        slots: of the barrier, if there is one.
+        slots: of each barrier.
         lanes: threads that share the joined places; see `places.coloured`.
         device: of Warp.
     """
@@ -209,6 +209,7 @@ def contact_arrays(
         slides = np.array([isinstance(body.motion, Sliding) for body in bodies])[together.chosen(order).body]
         abreast = [slides[a:b].sum() for a, b in pairwise(colour)]
         given |= {"colours": len(colour) - 1, "colour": colour + len(alone), "lanes": lanes}
+        given |= runs_of(places, colour + len(alone), grid, passing, RUN if lanes == 1 else 1)
         given["abreast"] = float(max(abreast, default=1))
     if effects.friction:
         before, after = neighbours(together)
@@ -221,12 +222,43 @@ def contact_arrays(
     if effects.turbulence:
         given["length"] = places.length
     given["slot"] = np.full(len(places), -1, dtype=np.int32)
-    if slots is not None:
-        given["slot"], given["share"] = slots.shares(places, grid.spacing)
-        given["foot"] = slots.feet(places)
+    if slots:
+        given["slot"], given["share"] = shares(slots, places, grid.spacing)
+        given["foot"] = feet(slots, places)
     shapes = dict.fromkeys(types.contact_fields, len(places)) | {"last": 1, "more": 1}
-    shapes |= {"taken": SLOT_SIZE * (len(slots) if slots is not None else 0), "turned": 2 * int(first[-1])}
+    shapes |= {"taken": SLOT_SIZE * sum(map(len, slots)), "turned": 2 * int(first[-1])}
     return filled(types.Contact(), types.contact_fields, given, shapes, device)
+
+
+RUN = 8
+"""Places of one run, where one thread does them all."""
+
+
+def runs_of(
+    places: Places, colour: NDArray[np.int32], grid: GridLayout, passing: Sequence[bool], length: int
+) -> dict[str, NDArray[np.int32]]:
+    """Runs of places of one colour, `length` at most, and the blocks of the grid that may hold the nodes of each; all
+    blocks where its body moves relative to the grid."""
+    begins = [np.arange(begin, end, length) for begin, end in pairwise(colour)]
+    first = np.concatenate([np.zeros(0, dtype=np.int64), *begins])
+    ends = np.append(first[1:], colour[-1])
+    blocks = np.array([grid.columns, grid.rows]) // BLOCK
+    around = np.tile(np.array([0, blocks[0] - 1, 0, blocks[1] - 1], dtype=np.int32), (len(first), 1))
+    cell = np.floor((places.position[:, :2] - (grid.left, grid.bottom)) / grid.spacing).astype(np.int64)
+    held = places.first >= 0
+    cell[held] = np.stack(np.divmod(places.first[held] % (grid.columns * grid.rows), grid.rows), axis=1) + 1
+    moves = np.array(passing)[places.body]
+    for run, (begin, end) in enumerate(zip(first, ends, strict=True)):
+        if not moves[begin:end].any():
+            # Nodes lie a cell to either side; one more for rounding.
+            low, high = cell[begin:end].min(axis=0) - 2, cell[begin:end].max(axis=0) + 2
+            around[run] = np.clip(np.stack([low, high], axis=1) // BLOCK, 0, blocks[:, None] - 1).ravel()
+    return {
+        "runs": np.searchsorted(first, colour).astype(np.int32),
+        "run": np.append(first, colour[-1]).astype(np.int32),
+        "around": around,
+        "near": np.ones(len(first), dtype=np.int32),
+    }
 
 
 def pieces_by_column(pieces: Segments, grid: GridLayout) -> NDArray[np.int32]:

@@ -98,9 +98,9 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         "per_mass": array(dtype=W),
         "inverse": array(dtype=scalar),  # sum of N_i^2 / m_i; 0: nothing is there
         "solid": array(dtype=scalar),  # impulses of the step [N s/m]: on the solid along the normal,
-        "slot": array(dtype=wp.int32),  # of the barrier (`loads.Slots`); -1: of another body
+        "slot": array(dtype=wp.int32),  # of a barrier (`loads.Slots`); -1: of another body
         "share": array(dtype=wp.float64),  # of the impulse that goes there; the rest goes to the next slot
-        "foot": array(dtype=wp.vec2d),  # on the surface at t = 0 [m]
+        "foot": array(dtype=wp.vec2d),  # on the surface at t = 0, from the barrier's toe [m]
         "taken": array(dtype=wp.float64),  # [slots x SLOT_SIZE] sums since t = 0
         "turned": array(dtype=wp.float64),  # [surfaces x 2] sums of F_x y and F_y x of the same [N s]
         "block": array(dtype=wp.int32),  # [groups] of those that stand alone
@@ -112,6 +112,11 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         fields |= {
             "colours": wp.int32,  # of joined places; those of one colour share no node
             "colour": array(dtype=wp.int32),  # [colours + 1] where each begins
+            # Places of a colour that follow each other are a run, and run by run those far from the flow are left out.
+            "runs": array(dtype=wp.int32),  # [colours + 1] the first run of each colour
+            "run": array(dtype=wp.int32),  # [runs + 1] where each begins
+            "around": array(dtype=wp.vec4i),  # [runs] first and last blocks along x and y that may hold its nodes
+            "near": array(dtype=wp.int32),  # [runs] 1: one of them held flow in the last step
             "lanes": wp.int32,  # threads that share the places of a colour
             "abreast": scalar,  # places of one colour on a body that slides, at most
             "last": array(dtype=wp.float64),  # [1] time step of the impulses [s]
@@ -129,6 +134,7 @@ def contact_fields(effects: Effects, scalar: Any, X: Any, V3: Any, W: Any, R: An
         if effects.liquid:
             fields["alone"] = array(dtype=scalar)  # on liquid that fills the volume, as it would move alone
     if effects.materials:
+        fields["mixed"] = array(dtype=wp.int32)  # 1: other materials than the flow's may be at the nodes
         # Means over the nodes of a place, per mass of the solid, as the parameters of these names.
         if effects.two_phase:
             fields["liquid_ratio"] = array(dtype=scalar)

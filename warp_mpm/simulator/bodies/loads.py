@@ -1,4 +1,4 @@
-"""Where along the barrier the flow acts: its surfaces are divided into slots, in which kernels sum up impulses.
+"""Where along the barriers the flow acts: their surfaces are divided into slots, in which kernels sum up impulses.
 
 A slot is about as long as a cell. A place of contact stands for a stretch of surface around it, whose impulse goes to
 the slots that the stretch lies in by its share in each; what acts beyond the ends of a surface, as below the ground,
@@ -7,17 +7,17 @@ goes to the slot at that end. So slots add up to the surface's reactions. They h
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mpm.scenario import Prescribed, Scenario, Trapezoid
+from warp_mpm.scenario import Barrier, Prescribed, Scenario, Trapezoid
+from warp_mpm.scenario.site import all_standing
 
 from .body import Body
-from .of_scene import BARRIER
 from .outline import Segments
 from .places import PER_CELL, Places
 
@@ -29,9 +29,13 @@ MOST = 4096
 
 @dataclass(frozen=True)
 class Stretch:
-    """A surface of the barrier, along its straight pieces, and its n slots."""
+    """A surface of a barrier, along its straight pieces, and its n slots."""
 
     surface: str
+    rubs: bool
+    """Whether it has friction."""
+    toe: Array
+    """[2] of the barrier at t = 0 [m]."""
     pieces: tuple[int, ...]
     """Of the outline, one after the other."""
     first: int
@@ -59,13 +63,13 @@ class Stretch:
         return slice(self.first, self.first + len(self))
 
     def place(self, way: Array) -> Array:
-        """Points [N, 2] at t = 0 [m] at a way [N] along the surface."""
+        """Points [N, 2] at t = 0, from the barrier's toe [m], at a way [N] along the surface."""
         piece = np.maximum(np.searchsorted(self.starts, way, side="left") - 1, 0)
-        return self.begins[piece] + (way - self.starts[piece])[:, None] * self.along[piece]
+        return self.begins[piece] - self.toe + (way - self.starts[piece])[:, None] * self.along[piece]
 
     @cached_property
     def heights(self) -> Array:
-        """[n + 1] y of the edges at t = 0 [m]."""
+        """[n + 1] of the edges above the barrier's toe at t = 0 [m]."""
         return self.place(self.edges)[:, 1]
 
 
@@ -83,7 +87,7 @@ class Patches:
     length: float
     """[m]; that of the surface where it is shorter than what was asked for."""
     heights: Array
-    """[P] y of their middles at t = 0 [m]."""
+    """[P] of their middles above the barrier's toe at t = 0 [m]."""
     shared: bool
     """Whether slots share their load with their neighbours."""
     _ends: tuple[tuple[NDArray[np.int64], Array], tuple[NDArray[np.int64], Array]]
@@ -117,11 +121,13 @@ class Patches:
 
 @dataclass(frozen=True)
 class Slots:
-    """The barrier's surfaces, divided: face, crest, back, those that it has."""
+    """A barrier's surfaces, divided: face, crest, back, those that it has."""
 
     stretches: tuple[Stretch, ...]
     body: int
     """Number of the barrier among the bodies."""
+    heel: tuple[float, float] | None = None
+    """From its toe [m]; None of a wall, which has none."""
 
     def __len__(self) -> int:
         return sum(len(stretch) for stretch in self.stretches)
@@ -131,12 +137,20 @@ class Slots:
         """The impacted one."""
         return self.stretches[0]
 
-    def shares(self, places: Places, spacing: float) -> tuple[NDArray[np.int32], Array]:
-        """Slot [C] of each place of contact, -1 of one that is none of the barrier's, and the share [C] of its impulse
-        that goes there; the rest goes to the next slot."""
-        slot, share = np.full(len(places), -1, dtype=np.int32), np.ones(len(places))
-        for stretch, piece, start_of_piece, begin, along in self._pieces():
-            own = np.flatnonzero((places.body == self.body) & (places.piece == piece))
+    def pieces(self) -> Iterator[tuple[Stretch, int, float, Array, Array]]:
+        """Of each piece its stretch, its number in the outline, its start, where it begins and its direction."""
+        for stretch in self.stretches:
+            for piece in zip(stretch.pieces, stretch.starts, stretch.begins, stretch.along, strict=True):
+                yield stretch, *piece
+
+
+def shares(barriers: Collection[Slots], places: Places, spacing: float) -> tuple[NDArray[np.int32], Array]:
+    """Slot [C] of each place of contact, -1 of one that is no barrier's, and the share [C] of its impulse that goes
+    there; the rest goes to the next slot."""
+    slot, share = np.full(len(places), -1, dtype=np.int32), np.ones(len(places))
+    for slots in barriers:
+        for stretch, piece, start_of_piece, begin, along in slots.pieces():
+            own = np.flatnonzero((places.body == slots.body) & (places.piece == piece))
             # A pair of nodes stands for a cell's side, a point of the surface for half of it.
             width = np.where(places.first[own] >= 0, spacing, spacing / PER_CELL)
             start = start_of_piece + (places.position[own] - begin) @ along - 0.5 * width - stretch.edges[0]
@@ -146,47 +160,63 @@ class Slots:
             part[(number < 0) | (number >= len(stretch) - 1) | (part > 1.0 - 1e-6)] = 1.0
             slot[own] = stretch.first + np.clip(number, 0, len(stretch) - 1)
             share[own] = part
-        return slot, share
+    return slot, share
 
-    def feet(self, places: Places) -> Array:
-        """Points [C, 2] on the surface at t = 0 [m] where the barrier's places act; those of others are nil."""
-        feet = np.zeros((len(places), 2))
-        for _, piece, _, begin, along in self._pieces():
-            own = (places.body == self.body) & (places.piece == piece)
+
+def feet(barriers: Collection[Slots], places: Places) -> Array:
+    """Points [C, 2] on the surface at t = 0 where the barriers' places act, from their toes [m]; those of others are
+    nil."""
+    found = np.zeros((len(places), 2))
+    for slots in barriers:
+        for stretch, piece, _, begin, along in slots.pieces():
+            own = (places.body == slots.body) & (places.piece == piece)
             reach = (places.position[own] - begin) @ along
-            feet[own] = begin + reach[:, None] * along
-        return feet
-
-    def _pieces(self) -> Iterator[tuple[Stretch, int, float, Array, Array]]:
-        for stretch in self.stretches:
-            for piece in zip(stretch.pieces, stretch.starts, stretch.begins, stretch.along, strict=True):
-                yield stretch, *piece
+            found[own] = begin - stretch.toe + reach[:, None] * along
+    return found
 
 
-def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> Slots | None:
-    """The slots of the scenario's barrier; None without one."""
-    if scenario.barrier is None:
-        return None
-    body = [one.name for one in bodies].index(BARRIER)
-    pieces = bodies[body].outline.segments
-    found: list[Stretch] = []
-    for surface in bodies[body].surfaces:
-        own = list(surface.pieces if surface.pieces is not None else range(len(pieces)))
-        if not own:
+def slots_of(scenario: Scenario, bodies: Sequence[Body]) -> dict[str, Slots]:
+    """The slots of each of the scenario's barriers by its name, in the order of the bodies."""
+    standing = {name: (x, barrier, outline) for name, x, barrier, outline in all_standing(scenario)}
+    found: dict[str, Slots] = {}
+    first = 0
+    for number, body in enumerate(bodies):
+        if body.name not in standing:
             continue
-        starts, low, high = _along(scenario, pieces, own)
-        count = int(min(max(1.0, (high - low) / scenario.numerics.spacing_m + 1e-9), MOST))
-        first = found[-1].first + len(found[-1]) if found else 0
-        edges = np.linspace(low, high, count + 1)
-        found.append(Stretch(surface.name, tuple(own), first, pieces.begin[own], pieces.along[own], starts, edges))
-    return Slots(tuple(found), body)
+        x, barrier, outline = standing[body.name]
+        foot = 0.0 if scenario.ground is None else float(scenario.ground.height(x))
+        toe = np.array([x, foot]) if outline is None else outline[0]
+        pieces = body.outline.segments
+        stretches: list[Stretch] = []
+        for surface in body.surfaces:
+            own = list(surface.pieces if surface.pieces is not None else range(len(pieces)))
+            if not own:
+                continue
+            starts, low, high = _along(scenario, barrier, pieces, own, foot)
+            count = int(min(max(1.0, (high - low) / scenario.numerics.spacing_m + 1e-9), MOST))
+            edges = np.linspace(low, high, count + 1)
+            lies = (pieces.begin[own], pieces.along[own], starts, edges)
+            stretches.append(Stretch(surface.name, surface.friction > 0.0, toe, tuple(own), first, *lies))
+            first += count
+        heel = None if outline is None else (float(outline[-1, 0] - toe[0]), float(outline[-1, 1] - toe[1]))
+        found[body.name] = Slots(tuple(stretches), number, heel)
+    return found
 
 
-def _along(scenario: Scenario, pieces: Segments, own: Sequence[int]) -> tuple[Array, float, float]:
+def _along(
+    scenario: Scenario, barrier: Barrier, pieces: Segments, own: Sequence[int], foot: float
+) -> tuple[Array, float, float]:
     """Way along a surface [m] to where each of its pieces begins, and to where its slots begin and end. A wall has no
-    end; what the flow would reach with twice its energy is divided, however long the run."""
-    assert scenario.barrier is not None
-    shape, flow = scenario.barrier.shape, scenario.flow
+    end; what the flow would reach with twice its energy is divided, however long the run.
+
+    Args:
+        scenario: of the run.
+        barrier: whose surface it is.
+        pieces: of its outline.
+        own: those of the surface.
+        foot: y of the ground at its toe [m].
+    """
+    shape, flow = barrier.shape, scenario.flow
     if isinstance(shape, Trapezoid):
         corners = pieces.begin if pieces.closed else shape.outline
         lengths = np.array([float(np.hypot(*(corners[(k + 1) % len(corners)] - corners[k]))) for k in own])
@@ -200,10 +230,10 @@ def _along(scenario: Scenario, pieces: Segments, own: Sequence[int]) -> tuple[Ar
         return starts, 0.0, max(float(shown.sum()), 1e-9)
     y, g = np.concatenate(flow.outlines)[:, 1], -scenario.gravity.vector[1]
     low, high = y.min(), y.max()
-    motion, speed = scenario.barrier.motion, flow.greatest_speed
+    motion, speed = barrier.motion, flow.greatest_speed
     if isinstance(motion, Prescribed):
         speed += max(abs(velocity) for velocity in motion.velocities_m_per_s)
     reach = flow.depth + (speed**2 / g if g > 0.0 else 10.0 * flow.depth)
-    low = 0.0 if scenario.ground is not None else float(low) - reach
+    low = foot if scenario.ground is not None else float(low) - reach
     begin = float(pieces.begin[own[0], 1])
     return np.zeros(1), low - begin, float(high) + reach - begin

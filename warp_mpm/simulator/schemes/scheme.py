@@ -158,4 +158,5 @@ def all_functions(scheme: Scheme, types: SimpleNamespace, tools: SimpleNamespace
         "start_across": start_across,
         "collect_in_space": None,
     }
-    return defaults | scheme.functions(types, tools)
+    own = scheme.functions(types, tools)
+    return defaults | own | {"receives": "receive" in own}

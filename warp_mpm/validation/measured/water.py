@@ -142,7 +142,7 @@ def watch(setup: Setup, cells: int, gauges: Sequence[float] = ()) -> Watched:
         bodies=_gate(setup, spacing),
     )
     times = np.arange(1, round(setup.end / RECORD) + 1) * RECORD
-    edges = np.zeros(1) if simulation.slots is None else simulation.slots.face.heights
+    edges = simulation.slots["barrier"].face.heights if simulation.slots else np.zeros(1)
     fronts, levels, loads = [], [], []
     before = simulation.window()
     for time in times:
