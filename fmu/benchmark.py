@@ -14,9 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fmu.archive import ROOT
-from fmu.instance import Unit, instance
 from warp_mpm.performance.table import Progress, Table
+
+from .archive import ROOT
+from .instance import Unit, instance
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario, Simulation

@@ -6,8 +6,8 @@ import html
 from importlib import metadata
 from pathlib import Path
 
-from fmu import reference
-from fmu.units.interface import Interface, Variable
+from . import reference
+from .units.interface import Interface, Variable
 
 _ASSETS = Path(__file__).parent / "assets"
 _ROOT = Path(__file__).parent.parent

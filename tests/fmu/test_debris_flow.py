@@ -342,7 +342,9 @@ def test_worker_is_safe_from_the_hosts_environment(
 @pytest.fixture
 def resources(tmp_path: Path) -> Path:
     """The resources of an archive whose Python has gone."""
-    (tmp_path / "worker.json").write_text(json.dumps({"interpreter": "/gone/python", "import_path": []}))
+    (tmp_path / "worker.json").write_text(
+        json.dumps({"interpreter": "/gone/python", "worker": "fmu.worker", "import_path": []})
+    )
     return tmp_path
 
 
@@ -378,14 +380,14 @@ def fake_worker(folder: Path, behaviour: str) -> str:
     (package / "__init__.py").write_text("")
     (package / "worker.py").write_text(textwrap.dedent(behaviour))
     (folder / "worker.json").write_text(
-        json.dumps({"interpreter": sys.executable, "import_path": [str(folder / "fake")]})
+        json.dumps({"interpreter": sys.executable, "worker": "fmu.worker", "import_path": [str(folder / "fake")]})
     )
     return str(folder)
 
 
 _REAL_WORKER = f"""
         import sys
-        sys.path.remove(sys.argv[1])
+        sys.path.remove(sys.argv[2])
         sys.path.insert(0, {str(ROOT)!r})
         for name in [name for name in sys.modules if name.split(".")[0] == "fmu"]:
             del sys.modules[name]
