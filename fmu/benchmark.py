@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import random
 import statistics
 import subprocess
 import sys
@@ -146,12 +147,10 @@ def _start_plain(scenario_file: Path) -> float:
 
 
 def _in_turns(calls: Mapping[str, Timed], rounds: int) -> dict[str, list[float]]:
-    """Wall times [s] of each call, which take turns in an order that goes round."""
-    names = list(calls)
-    spent: dict[str, list[float]] = {name: [] for name in names}
+    """Wall times [s] of each call, which take turns, each turn in an order of its own."""
+    spent: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(rounds):
-        for place in range(len(names)):
-            name = names[(place + turn) % len(names)]
+        for name in random.Random(turn).sample(list(calls), len(calls)):
             spent[name].append(calls[name]())
     return spent
 

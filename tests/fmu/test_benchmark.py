@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import pytest
@@ -30,20 +31,26 @@ def test_every_unit_has_its_line_in_terminal_and_page(tmp_path: Path, monkeypatc
     assert "| plain simulation |  |" not in found
 
 
-def test_turns_go_round_and_what_slows_a_turn_changes_no_ratio() -> None:
-    """Nobody always follows the same one; a turn in which everything took ten times as long is one turn of many."""
-    order = []
+def test_nobody_always_follows_the_same_one() -> None:
+    """Who comes after the plain simulation finds other caches than who comes after a unit."""
+    order: list[str] = []
 
-    def call(name: str, seconds: list[float]) -> benchmark.Timed:
+    def call(name: str) -> benchmark.Timed:
         def timed() -> float:
             order.append(name)
-            return seconds.pop(0)
+            return float(len(order))
 
         return timed
 
-    times = benchmark._in_turns({"plain": call("plain", [1.0, 10.0, 1.0]), "unit": call("unit", [1.1, 11.0, 2.0])}, 3)
-    assert order == ["plain", "unit", "unit", "plain", "plain", "unit"]
-    assert benchmark._over(times["unit"], times["plain"]) == pytest.approx(0.1)
+    times = benchmark._in_turns({name: call(name) for name in "abcd"}, 40)
+    assert all(sorted(order[begin : begin + 4]) == list("abcd") for begin in range(0, 160, 4))
+    assert set(itertools.permutations("abcd", 2)) <= set(itertools.pairwise(order))
+    assert times["a"] == [place for place, name in enumerate(order, 1) if name == "a"]
+
+
+def test_what_slows_a_turn_changes_no_ratio() -> None:
+    """A turn in which everything took ten times as long is one turn of many."""
+    assert benchmark._over([1.1, 11.0, 2.0], [1.0, 10.0, 1.0]) == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(
