@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -51,6 +54,25 @@ def test_nobody_always_follows_the_same_one() -> None:
 def test_what_slows_a_turn_changes_no_ratio() -> None:
     """A turn in which everything took ten times as long is one turn of many."""
     assert benchmark._over([1.1, 11.0, 2.0], [1.0, 10.0, 1.0]) == pytest.approx(0.1)
+
+
+@pytest.mark.skipif(not benchmark.CHILDREN.exists(), reason="only Linux tells of a process's children")
+def test_processor_time_is_that_of_children_too() -> None:
+    """What they compute, not what they sleep."""
+    code = (
+        "import time\ntime.sleep(0.2)\nbegin = time.process_time()\nwhile time.process_time() < begin + 0.1: pass\n"
+        "print(flush=True)\ninput()"
+    )
+    before = benchmark.processor_time()
+    child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        spent, own = benchmark.processor_time() - before, time.process_time()
+        assert child.stdin is not None
+        child.stdin.write(b"\n")
+    assert spent >= 0.1
+    assert benchmark.processor_time() == pytest.approx(own, abs=0.05)  # of this process alone
 
 
 @pytest.mark.parametrize(
