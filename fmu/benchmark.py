@@ -99,16 +99,17 @@ def simulator_costs(
         noted = {name: _noting_processor_time(step, computed[name]) for name, step in steps.items()}
         taken = _in_turns(noted, max(1, round(end_time / (STEP * STEPS_A_TURN))))
     rows = []
+    each = 1e3 / STEPS_A_TURN  # of the steps of a turn [ms]
     for name in steps:
-        start, step = statistics.median(begun[name]), 1e3 * statistics.median(taken[name]) / STEPS_A_TURN
-        busy = 1e3 * statistics.median(computed[name]) / STEPS_A_TURN
-        over = (f"{_over(begun[name], begun[PLAIN]):+.0%}", f"{_over(taken[name], taken[PLAIN]):+.1%}")
-        over = (*over, f"{_over(computed[name], computed[PLAIN]):+.1%}") if name != PLAIN else ("", "", "")
-        rows.append((name, f"{start:.2f}", over[0], f"{step:.1f}", over[1], f"{busy:.1f}", over[2]))
+        row = [name]
+        for spent, scale, digits, over_digits in ((begun, 1.0, 2, 0), (taken, each, 1, 1), (computed, each, 1, 1)):
+            over = f"{_over(spent[name], spent[PLAIN]):+.{over_digits}%}" if name != PLAIN else ""
+            row += [f"{scale * statistics.median(spent[name]):.{digits}f}", over]
+        rows.append(row)
     title = f"The simulator, {scenario.title}, {spacing:g} m, communication step {STEP:g} s"
     columns = ("", "start [s]", "over plain", "a step [ms]", "over plain", "of processors [ms]", "over plain")
     told = columns if CHILDREN.exists() else columns[:5]  # elsewhere what a unit's simulator computes is not known
-    return Table("simulator", title, told, [row[: len(told)] for row in rows])
+    return Table("simulator", title, told, [tuple(row[: len(told)]) for row in rows])
 
 
 def _stepper(unit: Unit, size: float, steps: int) -> Timed:
