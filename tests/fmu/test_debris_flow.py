@@ -368,7 +368,8 @@ def test_interpreter_without_the_project_is_reported(
     monkeypatch.setenv(INTERPRETER_VARIABLE, str(tmp_path / "empty" / folder / "python"))
     with pytest.raises(
         Exception,
-        match=rf"The Python .*empty.* has no warp-mpm-impact .*install it there, or set {INTERPRETER_VARIABLE}",
+        match=rf"The Python .*empty.* has no warp-mpm-impact \(No module named 'warp_mpm_fmu'\): install it there, or set "
+        rf"{INTERPRETER_VARIABLE}",
     ):
         WorkerProcess(str(resources))
 
