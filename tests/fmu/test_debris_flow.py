@@ -368,8 +368,8 @@ def test_interpreter_without_the_project_is_reported(
     monkeypatch.setenv(INTERPRETER_VARIABLE, str(tmp_path / "empty" / folder / "python"))
     with pytest.raises(
         Exception,
-        match=rf"The Python .*empty.* has no warp-mpm-impact \(No module named 'warp_mpm_fmu'\): install it there, or set "
-        rf"{INTERPRETER_VARIABLE}",
+        match=r"The Python .*empty.* has no warp-mpm-impact \(No module named 'warp_mpm_fmu'\): install it there, or "
+        f"set {INTERPRETER_VARIABLE}",
     ):
         WorkerProcess(str(resources))
 
