@@ -1,4 +1,4 @@
-"""`python -m fmu`, and the installed command `warp-mpm-fmu`."""
+"""`python -m fmu` in a checkout; installed, `python -m warp_mpm_fmu` and the command `warp-mpm-fmu`."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ from pathlib import Path
 def main() -> None:
     """Run the command line."""
     try:
-        from fmu import cli
+        from . import cli
 
         cli.main()
     except KeyboardInterrupt:  # while the command line itself is loaded

@@ -21,16 +21,19 @@ from importlib import metadata
 from pathlib import Path
 
 from analytic.version import PROJECT, project_version
-from fmu import documentation, reference
-from fmu.units.debris_flow import SCENARIO
-from fmu.units.interface import Interface
-from fmu.units.slave import UnitError
-from fmu.units.worker_process import RECORD
 from warp_mpm.shipped import SCENARIOS
+
+from . import documentation, reference
+from .units.debris_flow import SCENARIO
+from .units.interface import Interface
+from .units.slave import UnitError
+from .units.worker_process import RECORD
 
 _HERE = Path(__file__).parent
 _UNITS = _HERE / "units"
 ROOT = _HERE.parent
+WORKER = f"{__package__}.worker"
+"""The simulator's module, which `ROOT` on the import path makes known."""
 _COMMON_MODULES = ("__init__.py", "interface.py", "model_description.py", "slave.py")
 _ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 
@@ -105,7 +108,7 @@ class PythonUnit:
     def interface(self) -> Interface:
         import importlib
 
-        return importlib.import_module(f"fmu.units.{self.module}").INTERFACE
+        return importlib.import_module(f".units.{self.module}", __package__).INTERFACE
 
 
 DEFAULT_SCENARIO = SCENARIOS / "set_iib.json"
@@ -224,7 +227,7 @@ def scenario_for(chosen: Path | None) -> Path:
 
 def _simulator_resources(scenario: Path, *, recorded: bool = True) -> dict[str, bytes]:
     """The scenario that runs unless the importer names another, and which Python has the simulator."""
-    record = {"interpreter": sys.executable, "import_path": [str(ROOT)]}
+    record = {"interpreter": sys.executable, "worker": WORKER, "import_path": [str(ROOT)]}
     return {
         SCENARIO: whole(scenario),
         **({RECORD: json.dumps(record, indent=2).encode()} if recorded else {}),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import random
 import statistics
 import subprocess
 import sys
@@ -14,9 +15,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fmu.archive import ROOT
-from fmu.instance import Unit, instance
 from warp_mpm.performance.table import Progress, Table
+
+from .archive import ROOT
+from .instance import Unit, instance
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario, Simulation
@@ -31,6 +33,8 @@ ROUNDS, STEPS = 20, 500
 """Of the closed form: the fastest of so many rounds of so many steps, for other work may hold the processor."""
 
 PLAIN = "plain simulation"
+CHILDREN = Path("/proc/thread-self/children")
+"""File in which Linux tells the numbers of the processes that were begun here."""
 
 _PLAIN_START = (
     "import sys; sys.path.insert(0, sys.argv[1])\n"
@@ -63,7 +67,8 @@ def simulator_costs(
 
     All start with their kernels compiled before, the plain simulation in a process of its own. Each communication step
     ends with all outputs, the plain simulation's with a sample of all its quantities. They take turns, and nobody
-    always follows the same one; wall time, for a unit's simulator is another process. Told are medians.
+    always follows the same one. Wall time, and what the processes have computed: other work on the machine makes a unit
+    wait twice, for its simulator is another process. Told are medians.
 
     Parameters
     ----------
@@ -90,15 +95,21 @@ def simulator_costs(
         progress("communication steps")
         steps: dict[str, Timed] = {PLAIN: partial(_step_plain, simulation)}
         steps |= {unit.name: _stepper(unit, STEP, STEPS_A_TURN) for unit in units}
-        taken = _in_turns(steps, max(1, round(end_time / (STEP * STEPS_A_TURN))))
+        computed: dict[str, list[float]] = {name: [] for name in steps}
+        noted = {name: _noting_processor_time(step, computed[name]) for name, step in steps.items()}
+        taken = _in_turns(noted, max(1, round(end_time / (STEP * STEPS_A_TURN))))
     rows = []
+    each = 1e3 / STEPS_A_TURN  # of the steps of a turn [ms]
     for name in steps:
-        start, step = statistics.median(begun[name]), 1e3 * statistics.median(taken[name]) / STEPS_A_TURN
-        over_start, over_step = f"{_over(begun[name], begun[PLAIN]):+.0%}", f"{_over(taken[name], taken[PLAIN]):+.1%}"
-        over = ("", "") if name == PLAIN else (over_start, over_step)
-        rows.append((name, f"{start:.2f}", over[0], f"{step:.1f}", over[1]))
+        row = [name]
+        for spent, scale, digits, over_digits in ((begun, 1.0, 2, 0), (taken, each, 1, 1), (computed, each, 1, 1)):
+            over = f"{_over(spent[name], spent[PLAIN]):+.{over_digits}%}" if name != PLAIN else ""
+            row += [f"{scale * statistics.median(spent[name]):.{digits}f}", over]
+        rows.append(row)
     title = f"The simulator, {scenario.title}, {spacing:g} m, communication step {STEP:g} s"
-    return Table("simulator", title, ("", "start [s]", "over plain", "a step [ms]", "over plain"), rows)
+    columns = ("", "start [s]", "over plain", "a step [ms]", "over plain", "of processors [ms]", "over plain")
+    told = columns if CHILDREN.exists() else columns[:5]  # elsewhere what a unit's simulator computes is not known
+    return Table("simulator", title, told, [tuple(row[: len(told)]) for row in rows])
 
 
 def _stepper(unit: Unit, size: float, steps: int) -> Timed:
@@ -115,6 +126,23 @@ def _stepper(unit: Unit, size: float, steps: int) -> Timed:
         return time.perf_counter() - start
 
     return take
+
+
+def _noting_processor_time(timed: Timed, into: list[float]) -> Timed:
+    def noted() -> float:
+        begin = processor_time()
+        spent = timed()
+        into.append(processor_time() - begin)
+        return spent
+
+    return noted
+
+
+def processor_time() -> float:
+    """What this process has computed so far [s] and, where Linux tells, those that it began and that still live."""
+    children = map(int, CHILDREN.read_text().split()) if CHILDREN.exists() else ()
+    # The clock of another process is told by its number: clock_getcpuclockid(3), which Python lacks.
+    return time.process_time() + sum(time.clock_gettime(~child << 3 | 2) for child in children)
 
 
 def _step_plain(simulation: Simulation) -> float:
@@ -145,12 +173,10 @@ def _start_plain(scenario_file: Path) -> float:
 
 
 def _in_turns(calls: Mapping[str, Timed], rounds: int) -> dict[str, list[float]]:
-    """Wall times [s] of each call, which take turns in an order that goes round."""
-    names = list(calls)
-    spent: dict[str, list[float]] = {name: [] for name in names}
+    """Wall times [s] of each call, which take turns, each turn in an order of its own."""
+    spent: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(rounds):
-        for place in range(len(names)):
-            name = names[(place + turn) % len(names)]
+        for name in random.Random(turn).sample(list(calls), len(calls)):
             spent[name].append(calls[name]())
     return spent
 

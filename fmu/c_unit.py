@@ -25,13 +25,14 @@ from xml.etree.ElementTree import Element, indent, tostring
 import fmpy
 
 from analytic.version import PROJECT, project_version
-from fmu import documentation, fmi3_description
-from fmu.archive import ROOT, BuildError, scenario_for, whole, write_archive
-from fmu.units import protocol, worker_process
-from fmu.units.debris_flow import SCENARIO
-from fmu.units.interface import Interface, Variable
-from fmu.units.model_description import guid, model_description
 from warp_mpm.extras import missing
+
+from . import documentation, fmi3_description
+from .archive import ROOT, WORKER, BuildError, scenario_for, whole, write_archive
+from .units import protocol, worker_process
+from .units.debris_flow import SCENARIO
+from .units.interface import Interface, Variable
+from .units.model_description import guid, model_description
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class CUnit:
 
     @property
     def interface(self) -> Interface:
-        table: Interface = importlib.import_module(f"fmu.units.{self.module}").INTERFACE
+        table: Interface = importlib.import_module(f".units.{self.module}", __package__).INTERFACE
         return replace(
             table, name=self.name, output_derivatives=self.derivatives, directional_derivatives=self.directional
         )
@@ -157,7 +158,7 @@ def build_c_unit(
     if unit.base == "DebrisFlow":
         entries[f"resources/{SCENARIO}"] = whole(scenario_for(scenario))
         if recorded:
-            entries[f"resources/{worker_process.PLAIN_RECORD}"] = f"{sys.executable}\n{ROOT}\n".encode()
+            entries[f"resources/{worker_process.PLAIN_RECORD}"] = f"{sys.executable}\n{WORKER}\n{ROOT}\n".encode()
         entries["resources/requirements.txt"] = f"{PROJECT}=={project_version()}\n".encode()
         for name, data in (simulated or {}).items():
             entries[f"documentation/{name.replace(unit.base, unit.name)}"] = data
@@ -267,6 +268,7 @@ def table_header(unit: CUnit, identity: str) -> str:
             f'#define RECORD "{worker_process.PLAIN_RECORD}"',
             f'#define SCENARIO "{SCENARIO}"',
             f'#define LAUNCH "{worker_process.LAUNCH}"',
+            f'#define INSTALLED_WORKER "{worker_process.INSTALLED_WORKER}"',
             f"#define PROTOCOL {protocol.PROTOCOL}",
         ]
     lines += [

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmu.instance import instance
+from .instance import instance
 
 QUICK_SETTINGS = {"spacing": 1.0}
 """Parameters for a quick run, of those units that have them: a coarse grid will do for a life cycle."""

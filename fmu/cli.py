@@ -1,4 +1,4 @@
-"""The command line: `python -m fmu build | release | check | parameters | benchmark`.
+"""The command line: `python -m fmu build | release | check | parameters | benchmark`, `warp_mpm_fmu` where installed.
 
 Exit codes: 0 done, 1 a check failed, 2 the input cannot be used (one sentence says why, on the standard error stream).
 """
@@ -17,10 +17,12 @@ from warp_mpm.commands.options import ScenarioCommandLine, with_options
 from warp_mpm.shipped import where_to_get
 
 if TYPE_CHECKING:
-    from fmu.cross_check import CrossCheck
+    from .cross_check import CrossCheck
 
 FAILED = 1
 DEFAULT_FOLDER = Path("build/fmu")
+COMMAND = f"python -m {__package__}"
+"""The package is `fmu` in a checkout, `warp_mpm_fmu` where it is installed."""
 
 app = typer.Typer(
     cls=ScenarioCommandLine,
@@ -35,10 +37,10 @@ add_version(app)
 
 def main() -> None:
     """Entry point of `python -m fmu` and of the installed command `warp-mpm-fmu`."""
-    app(prog_name="warp-mpm-fmu" if Path(sys.argv[0]).name.startswith("warp-mpm") else "python -m fmu")
+    app(prog_name="warp-mpm-fmu" if Path(sys.argv[0]).name.startswith("warp-mpm") else COMMAND)
 
 
-@app.command(epilog="Example: python -m fmu build --only BarrierSliding --only BarrierSlidingC --out fmus")
+@app.command(epilog=f"Example: {COMMAND} build --only BarrierSliding --only BarrierSlidingC --out fmus")
 def build(
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = DEFAULT_FOLDER,
     only: Annotated[list[str] | None, typer.Option(help="Unit to build; may be repeated.", show_default="all")] = None,
@@ -58,7 +60,7 @@ def build(
     The names of those in C end in C and C3. The same sources give the same bytes. DebrisFlow remembers this Python as
     the one that runs its simulator.
     """
-    from fmu import archive, c_unit
+    from . import archive, c_unit
 
     names = [unit.name for unit in archive.PYTHON_UNITS] + [unit.name for unit in c_unit.C_UNITS]
     chosen = only or names
@@ -76,7 +78,7 @@ def build(
         _refuse(f"{out} cannot be written: {error.strerror or error}.")
 
 
-@app.command(epilog="Example: python -m fmu release --out dist")
+@app.command(epilog=f"Example: {COMMAND} release --out dist")
 def release(
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     platform: Annotated[
@@ -91,8 +93,8 @@ def release(
 
     The same sources give the same bytes in any folder, on any day. The simulator's units remember no Python here.
     """
-    from fmu import archive
-    from fmu.release import build_release
+    from . import archive
+    from .release import build_release
 
     _check_folder(out)
     try:
@@ -104,8 +106,8 @@ def release(
 
 
 @app.command(
-    epilog="Examples: python -m fmu check; python -m fmu check build/fmu/BarrierSliding.fmu; "
-    "python -m fmu check scenarios/set_iib.json --out checks"
+    epilog=f"Examples: {COMMAND} check; {COMMAND} check build/fmu/BarrierSliding.fmu; "
+    f"{COMMAND} check scenarios/set_iib.json --out checks"
 )
 def check(
     files: Annotated[
@@ -130,7 +132,7 @@ def check(
     For a scenario: simulates it, calibrates λ and τ on the simulated force, runs the unit through fmpy, and shows F(t),
     v2(t) and Δx(t) of both in one figure and their differences in one table.
     """
-    from fmu import archive, c_unit
+    from . import archive, c_unit
 
     for file in files or ():
         if not file.is_file():
@@ -170,8 +172,8 @@ def check(
 
 
 @app.command(
-    epilog="Examples: python -m fmu parameters scenarios/set_iib.json; "
-    "python -m fmu parameters scenarios/set_iib.json --ssv > barrier.ssv"
+    epilog=f"Examples: {COMMAND} parameters scenarios/set_iib.json; "
+    f"{COMMAND} parameters scenarios/set_iib.json --ssv > barrier.ssv"
 )
 def parameters(
     scenario: Annotated[Path, typer.Argument(help="Scenario file or run folder of the simulator.")],
@@ -185,9 +187,10 @@ def parameters(
     from analytic.cli.terminal import number, print_json, print_table
     from analytic.fitted import CALIBRATED
     from analytic.scene import read_scene
-    from fmu import start_values
-    from fmu.system import as_xml, parameter_set
-    from fmu.units.barrier_sliding import INTERFACE
+
+    from . import start_values
+    from .system import as_xml, parameter_set
+    from .units.barrier_sliding import INTERFACE
 
     if variant not in start_values.WAYS:
         _refuse(f"--variant = {variant} is not allowed; it must be one of {', '.join(start_values.WAYS)}.")
@@ -224,7 +227,7 @@ def parameters(
         print_table(f"Start values of BarrierSliding: {scene.title}", ["", *values, "unit"], rows, notes[variant])
 
 
-@app.command(epilog="Example: python -m fmu benchmark --page docs/cosimulation.md")
+@app.command(epilog=f"Example: {COMMAND} benchmark --page docs/cosimulation.md")
 def benchmark(
     scenario: Annotated[
         Path | None, typer.Option(help="Scenario inside DebrisFlow.", show_default="scenarios/set_iib.json")
@@ -246,11 +249,12 @@ def benchmark(
     from fmpy.fmi1 import FMICallException
 
     from analytic.cli.terminal import print_table
-    from fmu import archive, c_unit
-    from fmu.benchmark import closed_form_costs, simulator_costs
     from warp_mpm import Scenario
     from warp_mpm.performance.benchmark import machine
     from warp_mpm.performance.table import put_into_page
+
+    from . import archive, c_unit
+    from .benchmark import closed_form_costs, simulator_costs
 
     chosen = scenario or archive.DEFAULT_SCENARIO
     _check_scenario(chosen)
@@ -290,7 +294,7 @@ def benchmark(
 def _build(
     names: list[str], out: Path, scenario: Path | None, platforms: tuple[str, ...] | None, *, by_name: bool
 ) -> None:
-    from fmu import archive, c_unit
+    from . import archive, c_unit
 
     simulated = None
     c_units = [unit for unit in c_unit.C_UNITS if unit.name in names]
@@ -316,7 +320,8 @@ def _build(
 
 def _prove(file: Path, content: list[object], as_json: bool) -> bool:
     from analytic.cli.terminal import print_table
-    from fmu.check import CheckError, check_archive
+
+    from .check import CheckError, check_archive
 
     try:
         results = check_archive(file)
@@ -343,9 +348,10 @@ def _compare(
 ) -> None:
     from analytic import plots
     from analytic.cli.terminal import print_table
-    from fmu.cross_check import cross_check
-    from fmu.figure import cross_check_figure
     from warp_mpm import Scenario
+
+    from .cross_check import cross_check
+    from .figure import cross_check_figure
 
     try:
         scenario = with_options(Scenario.load(file), spacing=spacing, until=until)
@@ -373,7 +379,8 @@ def _markdown(title: str, header: list[str], rows: list[list[str]], notes: list[
 def _comparison(found: CrossCheck) -> tuple[str, list[str], list[list[str]], list[str]]:
     """Title, header, rows and notes of the table."""
     from analytic.cli.terminal import number
-    from fmu.cross_check import CURVES, FIGURES
+
+    from .cross_check import CURVES, FIGURES
 
     header = ["", *(f"{label} [{unit}]" for label, unit, _ in FIGURES.values()), *(f"rms {s}" for s in CURVES.values())]
     rows = [

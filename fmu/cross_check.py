@@ -35,9 +35,10 @@ from analytic.calibration import bounded_from_below, calibrate, measure, measure
 from analytic.fitted import CALIBRATED
 from analytic.force_record import cumulative_impulse, moving_mean
 from analytic.scene import Scene, scene_of
-from fmu.instance import instance
-from fmu.start_values import PAPER, force_parameters, scene_parameters
 from warp_mpm.quantities import figures
+
+from .instance import instance
+from .start_values import PAPER, force_parameters, scene_parameters
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario

@@ -6,11 +6,19 @@ import html
 from importlib import metadata
 from pathlib import Path
 
-from fmu import reference
-from fmu.units.interface import Interface, Variable
+from . import reference
+from .units.interface import Interface, Variable
 
 _ASSETS = Path(__file__).parent / "assets"
 _ROOT = Path(__file__).parent.parent
+_PACKED_BY_PYTHONFMU = """\
+<h2>When to take the unit in C</h2>
+<p><code>{name}C</code> (FMI 2.0) and <code>{name}C3</code> (FMI 3.0) are the same model in plain C, with the same
+variables and the same numbers. Prefer them: they bring no Python into the importer's process and work from any folder.
+Take this one to read or change the model in Python{further}. It needs a Python &ge; 3.10 in the importer's process, a
+folder without characters that URLs encode (accented letters, <code>#</code>, <code>+</code>, <code>%</code>, brackets),
+and on Linux glibc 2.32.</p>
+"""
 _STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1d2327}"
     "table{border-collapse:collapse;width:100%;font-size:.9rem}"
@@ -22,7 +30,7 @@ _STYLE = (
 def entries(interface: Interface, version: str, *, packer: str = "pythonfmu") -> dict[str, bytes]:
     """Documentation page, licences, icon and reference results of a unit, by their names in the archive."""
     found = {
-        "documentation/index.html": page(interface, version).encode(),
+        "documentation/index.html": page(interface, version, packer=packer).encode(),
         "documentation/licenses/license.txt": _own_licence(),
         "model.png": (_ASSETS / "icon.png").read_bytes(),
     }
@@ -31,9 +39,12 @@ def entries(interface: Interface, version: str, *, packer: str = "pythonfmu") ->
     return found | {f"documentation/{name}": data for name, data in reference.files(interface).items()}
 
 
-def page(interface: Interface, version: str) -> str:
+def page(interface: Interface, version: str, *, packer: str) -> str:
     """The documentation page: what the unit is, its equations and limits, and its table of variables."""
     body = (_ASSETS / f"{reference.base_of(interface.name)}.html").read_text(encoding="utf-8")
+    if packer == "pythonfmu":
+        further = ", or to run the simulator on Windows" if interface.name == "DebrisFlow" else ""
+        body += _PACKED_BY_PYTHONFMU.format(name=interface.name, further=further)
     tables = "".join(
         _table(heading, interface.of(causality))
         for heading, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))

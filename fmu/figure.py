@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from analytic.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
-from fmu.cross_check import Array, CrossCheck, Trajectory
+
+from .cross_check import Array, CrossCheck, Trajectory
 
 _STYLES = {
     "paper": (ORANGE, "--", "unit, the paper's λ"),

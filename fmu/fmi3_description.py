@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement
 
-from fmu.units.interface import SECOND, Choice, Interface, Variable
-from fmu.units.model_description import (
+from .units.interface import SECOND, Choice, Interface, Variable
+from .units.model_description import (
     AUTHOR,
     GENERATION_DATE,
     LICENSE,

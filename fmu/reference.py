@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fmu.units import barrier_sliding, debris_flow, ground_anchor
-from fmu.units.interface import Interface
-from fmu.units.slave import UnitError, UnitSlave
+from .units import barrier_sliding, debris_flow, ground_anchor
+from .units.interface import Interface
+from .units.slave import UnitError, UnitSlave
 
 InputHistory = Callable[[float], dict[str, float]]
 

@@ -10,8 +10,8 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-from fmu import archive, c_unit
-from fmu.system import write_system
+from . import archive, c_unit
+from .system import write_system
 
 MANIFEST = "SHA256SUMS"
 """In the form that `sha256sum --check` takes."""

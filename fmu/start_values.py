@@ -14,7 +14,8 @@ from typing import Any
 
 from analytic.fitted import CALIBRATED, beyond_fit, coefficients
 from analytic.scene import ASSUMED_RISE_RATIO, Scene
-from fmu.units.barrier_sliding import INTERFACE, VARIANT
+
+from .units.barrier_sliding import INTERFACE, VARIANT
 
 PAPER = "paper"
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, register_namespace, tostring
 
-from fmu.archive import write_archive
-from fmu.units import barrier_sliding, debris_flow, ground_anchor
-from fmu.units.interface import Interface
-from fmu.units.model_description import number, unit_definitions
+from .archive import write_archive
+from .units import barrier_sliding, debris_flow, ground_anchor
+from .units.interface import Interface
+from .units.model_description import number, unit_definitions
 
 if TYPE_CHECKING:
     from warp_mpm import Scenario

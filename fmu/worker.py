@@ -15,8 +15,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from fmu.units.protocol import PROTOCOL, RECORDED, SURFACE_FORCES
 from warp_mpm.quantities.time_series import NAMED
+
+from .units.protocol import PROTOCOL, RECORDED, SURFACE_FORCES
 
 KEYS = {name: NAMED[name].key for name in RECORDED}
 """Of the outputs, in the simulator's samples."""

@@ -22,7 +22,7 @@ from typing import NoReturn
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from fmu.system import barrier_parameters, scenario_in
+from warp_mpm_fmu.system import barrier_parameters, scenario_in
 
 UNITS = ("DebrisFlowC", "BarrierSlidingC", "GroundAnchorC")
 

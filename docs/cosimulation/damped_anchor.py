@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from fmu.instance import instance_of
+from warp_mpm_fmu.instance import instance_of
 
 BARRIER = {"flow_mass": 81e3, "barrier_mass": 81e3, "speed": 10.0, "base_friction": 0.29}
 YIELD_FORCES = (0.0, 25e3, 50e3, 100e3, 200e3)

@@ -14,8 +14,8 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu.instance import instance_of
-from fmu.system import barrier_parameters, scenario_in
+from warp_mpm_fmu.instance import instance_of
+from warp_mpm_fmu.system import barrier_parameters, scenario_in
 
 
 @dataclass

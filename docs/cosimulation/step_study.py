@@ -19,8 +19,8 @@ from coupled import run_coupled
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fmu.system import scenario_in
 from warp_mpm import Scenario, Simulation
+from warp_mpm_fmu.system import scenario_in
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "set_iib.json"
 STEPS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)

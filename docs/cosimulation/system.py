@@ -16,7 +16,7 @@ from pathlib import Path
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import Parameter, ParameterSet
 
-from fmu.system import COMPONENTS, parameters_in, scenario_in, write_system
+from warp_mpm_fmu.system import COMPONENTS, parameters_in, scenario_in, write_system
 
 UNITS = tuple(unit for unit, _ in COMPONENTS.values())
 

@@ -13,7 +13,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu.instance import instance_of
+from warp_mpm_fmu.instance import instance_of
 
 FELT = 1e3
 """Force on the barrier [N/m] from which on the flow is there."""

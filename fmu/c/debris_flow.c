@@ -191,7 +191,7 @@ static int is_file(const char *path) {
     return found;
 }
 
-/* Which Python, and where it finds the project: the environment variable, or the record of the build. */
+/* Which Python, the worker's module, and where that is found: the environment variable, or the record of the build. */
 static int find_interpreter(Unit *unit, char *record, size_t room, char *arguments[], int most) {
     const char *chosen = getenv(INTERPRETER_VARIABLE);
     char path[PATH_SIZE];
@@ -199,7 +199,7 @@ static int find_interpreter(Unit *unit, char *record, size_t room, char *argumen
     if (chosen && *chosen) {
         if (!is_file(chosen))
             return refuse(unit, INTERPRETER_VARIABLE " is %s, it must be the path of a Python interpreter.", chosen);
-        snprintf(record, room, "%s\n", chosen);
+        snprintf(record, room, "%s\n" INSTALLED_WORKER "\n", chosen);
     } else {
         in_resources(unit, RECORD, path);
         FILE *file = fopen(path, "rb");
@@ -253,9 +253,13 @@ static int start_worker(Unit *unit) {
     if (greeted)
         refuse(unit, "The simulator at %s speaks version %g of the protocol, this archive version %d: install the release "
                      "of warp-mpm-impact that built the archive.", found[0], protocol, PROTOCOL);
-    else if (strstr(unit->message, "No module named"))
-        refuse(unit, "The Python %s has no warp-mpm-impact (No module named 'fmu'): install it there, or set "
-                     INTERPRETER_VARIABLE " to the Python of an environment that has it.", found[0]);
+    else if (strstr(unit->message, "No module named")) {
+        char absent[MESSAGE_SIZE];
+        int length = snprintf(absent, sizeof absent, "%s", strstr(unit->message, "No module named"));
+        if (absent[length - 1] == '.') absent[length - 1] = 0;
+        refuse(unit, "The Python %s has no warp-mpm-impact (%s): install it there, or set " INTERPRETER_VARIABLE
+                     " to the Python of an environment that has it.", found[0], absent);
+    }
     close_worker(unit, 0);
     return 0;
 }

@@ -26,7 +26,7 @@ INTERPRETER_VARIABLE = "WARP_MPM_PYTHON"
 """Environment variable that names the Python of the worker, above the one recorded when the archive was built."""
 
 RECORD = "worker.json"
-"""File in the archive's resources that names the Python which built it and where it found this project."""
+"""File in the archive's resources that names the Python which built it, the worker's module and where it found that."""
 
 PLAIN_RECORD = "worker.txt"
 """The same, a line each, for the unit in C."""
@@ -37,7 +37,9 @@ START_TIME_LIMIT = 60.0
 # What a host sets for its own Python, or preloads into it, must not reach the worker's.
 _HOST_ONLY = ("LD_PRELOAD", "PYTHONHOME", "PYTHONPATH", "PYTHONEXECUTABLE", "PYTHONSTARTUP", "__PYVENV_LAUNCHER__")
 _CHUNK = 1 << 20
-LAUNCH = "import sys; sys.path[:0] = sys.argv[1:]; from fmu.worker import main; main()"
+LAUNCH = "import sys, importlib; sys.path[:0] = sys.argv[2:]; importlib.import_module(sys.argv[1]).main()"
+INSTALLED_WORKER = "warp_mpm_fmu.worker"
+"""The worker's module where this project is installed; in a checkout it is `fmu.worker`."""
 
 
 class WorkerProcess:
@@ -49,13 +51,13 @@ class WorkerProcess:
     """
 
     def __init__(self, resources: str) -> None:
-        interpreter, import_path = find_interpreter(resources)
+        interpreter, *arguments = find_interpreter(resources)
         environment = {name: value for name, value in os.environ.items() if name.upper() not in _HOST_ONLY}
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
         try:
             self._process: subprocess.Popen[bytes] | None = subprocess.Popen(
                 # -P: the host's working folder is no place to import from.
-                [interpreter, "-P", "-c", LAUNCH, *import_path],
+                [interpreter, "-P", "-c", LAUNCH, *arguments],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
@@ -76,11 +78,12 @@ class WorkerProcess:
         try:
             hello = self._answer("start", START_TIME_LIMIT)
         except UnitError as error:
-            if "No module named" not in str(error):
+            _, absent, name = str(error).partition("No module named ")
+            if not absent:
                 raise
             raise UnitError(
-                f"The Python {interpreter} has no warp-mpm-impact (No module named 'fmu'): install it there, or set "
-                f"{INTERPRETER_VARIABLE} to the Python of an environment that has it."
+                f"The Python {interpreter} has no warp-mpm-impact ({absent}{name.rstrip('.')}): install it there, or "
+                f"set {INTERPRETER_VARIABLE} to the Python of an environment that has it."
             ) from None
         if hello.get("protocol") != PROTOCOL:
             self.close()
@@ -170,8 +173,8 @@ class WorkerProcess:
         return f"The simulator's process ended {how} during the request {request!r}{words}."
 
 
-def find_interpreter(resources: str) -> tuple[str, list[str]]:
-    """The Python for the worker, and what it must add to its import path.
+def find_interpreter(resources: str) -> list[str]:
+    """The Python for the worker, the worker's module, and what must be added to the import path.
 
     Raises:
         UnitError: neither the environment variable nor the archive's record names a file that is there.
@@ -180,17 +183,17 @@ def find_interpreter(resources: str) -> tuple[str, list[str]]:
     if chosen:
         if not Path(chosen).is_file():
             raise UnitError(f"{INTERPRETER_VARIABLE} is {chosen}, it must be the path of a Python interpreter.")
-        return chosen, []
+        return [chosen, INSTALLED_WORKER]
     try:
         record = json.loads((Path(resources) / RECORD).read_text(encoding="utf-8"))
     except OSError:
-        record = {"interpreter": "", "import_path": []}
+        record = {"interpreter": ""}
     if not Path(record["interpreter"]).is_file():
         raise UnitError(
             f"There is no Python for the simulator at {record['interpreter'] or 'any recorded place'}: "
             f"set {INTERPRETER_VARIABLE} to the Python of the environment that has warp-mpm-impact."
         )
-    return record["interpreter"], record["import_path"]
+    return [record["interpreter"], record["worker"], *record["import_path"]]
 
 
 class _Lines:

@@ -139,6 +139,7 @@ def test_archive_holds_page_licence_and_icon(name: str, archives: dict[str, Path
         assert file.read(icon).startswith(b"\x89PNG")
         assert b"Apache License" in file.read("documentation/licenses/license.txt")
         names = file.namelist()
+        assert (f"<code>{name}C3</code> (FMI 3.0) are the same model in plain C" in page) == (name not in C_NAMES)
         assert names[0] == "modelDescription.xml"
         assert not [n for n in names if "__pycache__" in n or n.endswith(".pyc")]
     for variable in read_model_description(str(archives[name])).modelVariables:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -30,20 +34,45 @@ def test_every_unit_has_its_line_in_terminal_and_page(tmp_path: Path, monkeypatc
     assert "| plain simulation |  |" not in found
 
 
-def test_turns_go_round_and_what_slows_a_turn_changes_no_ratio() -> None:
-    """Nobody always follows the same one; a turn in which everything took ten times as long is one turn of many."""
-    order = []
+def test_nobody_always_follows_the_same_one() -> None:
+    """Who comes after the plain simulation finds other caches than who comes after a unit."""
+    order: list[str] = []
 
-    def call(name: str, seconds: list[float]) -> benchmark.Timed:
+    def call(name: str) -> benchmark.Timed:
         def timed() -> float:
             order.append(name)
-            return seconds.pop(0)
+            return float(len(order))
 
         return timed
 
-    times = benchmark._in_turns({"plain": call("plain", [1.0, 10.0, 1.0]), "unit": call("unit", [1.1, 11.0, 2.0])}, 3)
-    assert order == ["plain", "unit", "unit", "plain", "plain", "unit"]
-    assert benchmark._over(times["unit"], times["plain"]) == pytest.approx(0.1)
+    times = benchmark._in_turns({name: call(name) for name in "abcd"}, 40)
+    assert all(sorted(order[begin : begin + 4]) == list("abcd") for begin in range(0, 160, 4))
+    assert set(itertools.permutations("abcd", 2)) <= set(itertools.pairwise(order))
+    assert times["a"] == [place for place, name in enumerate(order, 1) if name == "a"]
+
+
+def test_what_slows_a_turn_changes_no_ratio() -> None:
+    """A turn in which everything took ten times as long is one turn of many."""
+    assert benchmark._over([1.1, 11.0, 2.0], [1.0, 10.0, 1.0]) == pytest.approx(0.1)
+
+
+@pytest.mark.skipif(not benchmark.CHILDREN.exists(), reason="only Linux tells of a process's children")
+def test_processor_time_is_that_of_children_too() -> None:
+    """What they compute, not what they sleep."""
+    code = (
+        "import time\ntime.sleep(0.2)\nbegin = time.process_time()\nwhile time.process_time() < begin + 0.1: pass\n"
+        "print(flush=True)\ninput()"
+    )
+    before = benchmark.processor_time()
+    child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        spent, own = benchmark.processor_time() - before, time.process_time()
+        assert child.stdin is not None
+        child.stdin.write(b"\n")
+    assert spent >= 0.1
+    assert benchmark.processor_time() == pytest.approx(own, abs=0.05)  # of this process alone
 
 
 @pytest.mark.parametrize(

@@ -342,7 +342,9 @@ def test_worker_is_safe_from_the_hosts_environment(
 @pytest.fixture
 def resources(tmp_path: Path) -> Path:
     """The resources of an archive whose Python has gone."""
-    (tmp_path / "worker.json").write_text(json.dumps({"interpreter": "/gone/python", "import_path": []}))
+    (tmp_path / "worker.json").write_text(
+        json.dumps({"interpreter": "/gone/python", "worker": "fmu.worker", "import_path": []})
+    )
     return tmp_path
 
 
@@ -366,7 +368,8 @@ def test_interpreter_without_the_project_is_reported(
     monkeypatch.setenv(INTERPRETER_VARIABLE, str(tmp_path / "empty" / folder / "python"))
     with pytest.raises(
         Exception,
-        match=rf"The Python .*empty.* has no warp-mpm-impact .*install it there, or set {INTERPRETER_VARIABLE}",
+        match=r"The Python .*empty.* has no warp-mpm-impact \(No module named 'warp_mpm_fmu'\): install it there, or "
+        f"set {INTERPRETER_VARIABLE}",
     ):
         WorkerProcess(str(resources))
 
@@ -378,14 +381,14 @@ def fake_worker(folder: Path, behaviour: str) -> str:
     (package / "__init__.py").write_text("")
     (package / "worker.py").write_text(textwrap.dedent(behaviour))
     (folder / "worker.json").write_text(
-        json.dumps({"interpreter": sys.executable, "import_path": [str(folder / "fake")]})
+        json.dumps({"interpreter": sys.executable, "worker": "fmu.worker", "import_path": [str(folder / "fake")]})
     )
     return str(folder)
 
 
 _REAL_WORKER = f"""
         import sys
-        sys.path.remove(sys.argv[1])
+        sys.path.remove(sys.argv[2])
         sys.path.insert(0, {str(ROOT)!r})
         for name in [name for name in sys.modules if name.split(".")[0] == "fmu"]:
             del sys.modules[name]

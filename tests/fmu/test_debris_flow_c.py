@@ -179,8 +179,8 @@ def test_interpreter_without_the_project_is_named(
     with pytest.raises(FMICallException):
         open_unit("DebrisFlowC").initialize(**QUICK)
     said = errors()
-    assert f"The Python {tmp_path}/empty/bin/python has no warp-mpm-impact" in said
-    assert f"install it there, or set {INTERPRETER_VARIABLE}" in said
+    assert f"The Python {tmp_path}/empty/bin/python has no warp-mpm-impact (No module named 'warp_mpm_fmu'): " in said
+    assert f": install it there, or set {INTERPRETER_VARIABLE}" in said
     monkeypatch.setenv(INTERPRETER_VARIABLE, str(tmp_path))
     with pytest.raises(FMICallException):
         open_unit("DebrisFlowC").initialize(**QUICK)

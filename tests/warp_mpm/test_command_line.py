@@ -161,7 +161,8 @@ SCRIPTS = tomllib.loads((SCENES.parent / "pyproject.toml").read_text())["project
 
 
 @pytest.mark.parametrize(
-    ("script", "package"), [("warp-mpm", "warp_mpm"), ("warp-mpm-analytic", "analytic"), ("warp-mpm-fmu", "fmu")]
+    ("script", "package"),
+    [("warp-mpm", "warp_mpm"), ("warp-mpm-analytic", "analytic"), ("warp-mpm-fmu", "warp_mpm_fmu")],
 )
 def test_each_command_line_is_an_installed_command_that_knows_its_name(script, package, monkeypatch, capsys):
     """What an installer makes of `project.scripts`: a program of that name, which calls that function."""
