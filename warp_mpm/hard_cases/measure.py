@@ -137,8 +137,8 @@ def _violence(snapshot: Snapshot) -> float:
 
 def energy_within_cells(simulation: Any, begin: Snapshot) -> float:
     """Kinetic energy [J/m] of what an affine scheme's points know of velocities about them, at the start: m |C|² d² / 8
-    with C the gradient, d² / 4 the second moment of the splines. The record holds that of the points' own velocities alone,
-    and takes the rest up as they part."""
+    with C the gradient, d² / 4 the second moment of the splines. The record holds that of the points' own velocities
+    alone, and takes the rest up as they part."""
     if len(begin.position) == 0:
         return 0.0
     grid, solid, liquid = simulation.grid, begin["solid_mass"], begin["liquid_mass"]
