@@ -1,13 +1,20 @@
 """The collection of hard scenes: a dozen of the worst by default, all of them, at half the time step too, when slow."""
 
 import math
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from warp_mpm.hard_cases.collection import LARGE, hard_cases
 from warp_mpm.hard_cases.criteria import CRITERIA
-from warp_mpm.hard_cases.measure import measure
+from warp_mpm.hard_cases.measure import energy_within_cells, measure
 from warp_mpm.hard_cases.safeguards import KNOWN_FAILURES
+from warp_mpm.scenario import Scenario
+from warp_mpm.simulation import Simulation
+from warp_mpm.snapshot import snapshot_of
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 WORST = (
     "barrier_leaves",
@@ -67,3 +74,16 @@ def test_criteria_catch_what_they_name():
             for bad in (criterion.limit_for(case.scenario) * 1.01 + 1e-6, float("nan"), float("inf")):
                 spoilt = type(good)(good.figures | {criterion.figure: bad})
                 assert [found.figure for found, _ in spoilt.failures(case.scenario)] == [criterion.figure]
+
+
+def test_energy_of_what_moves_within_a_cell_is_there_at_the_start():
+    """A block sheared alike all over: M γ̇² d² / 8 beside that of its points' velocities, which comes to them as they
+    part, and is no energy that the code has made."""
+    block = {"kind": "polygon", "vertices_m": [[-20, 0], [-10, 0], [-10, 3], [-20, 3]]}
+    changes = {"flow.shape": block, "flow.base_velocity_share": 0.1, "flow.velocity_exponent": 1.0}
+    simulation = Simulation(Scenario.load(SCENARIOS / "case_1_dry.json").replaced(changes))
+    begin, spacing = snapshot_of(simulation), simulation.grid.spacing
+    rate, _ = np.polyfit(begin.position[:, 1], begin["solid_velocity"][:, 0], 1)
+    all_over = begin["solid_mass"].sum() * rate**2 * spacing**2 / 8.0
+    # Points at its edges see less.
+    assert 0.9 * all_over < energy_within_cells(simulation, begin) < all_over

@@ -14,7 +14,7 @@ from warp_mpm.effect_rules import derive_effects, effect_rules, with_law
 from warp_mpm.kernels.elementary import make_elementary
 from warp_mpm.kernels.layout import layout
 from warp_mpm.scenario import Scenario
-from warp_mpm.simulator.laws import dilatancy
+from warp_mpm.simulator.laws import LAWS, dilatancy
 from warp_mpm.simulator.laws.law import all_functions
 
 TIME_STEP, RATE, PRESSURE = 1e-4, 10.0, 5e3
@@ -331,6 +331,20 @@ def run_of(scenario):
     simulation = Simulation(scenario)
     simulation.advance(scenario.output.end_time_s)
     return simulation.points()
+
+
+@pytest.mark.parametrize(("mean", "sine"), [(-3e3, math.sin(math.radians(11.0) + math.pi / 4.0)), (6e2, 0.0)])
+@pytest.mark.parametrize("law", ["mohr_coulomb", "coulomb_viscous"])
+def test_the_most_that_soil_of_any_density_bears(load_scene, law, mean, sine):
+    """Pressure makes strength of friction, and the densest soil has most; tension takes it away, and the loosest, which
+    has none, bears most."""
+    own, other = OWN | {"coefficient": 20.0}, {"mixture_viscosity_Pa_s": 0.0} if law != "mohr_coulomb" else {}
+    strength = {"friction_angle_deg": 11.0, "cohesion_Pa": 550.0, "tension_cutoff_Pa": 2500.0}
+    material = scene(load_scene, law=law, own=own, **strength, **other).flow.material
+    shear = 550.0 * math.cos(math.radians(11.0)) - sine * mean
+    stress = np.array([[mean + share * shear, mean - share * shear, mean, 0.0] for share in (0.999, 1.001)])
+    within, beyond = LAWS.named(law).yield_excess(material, stress)
+    assert within <= 0.0 < beyond
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ STATE_OF_BODIES = (
 LANES = 256
 """Threads of the one block that shares the joined places of contact on a GPU, Warp's own size of a block."""
 
-IMPULSES = ("solid", "liquid", "alone", "rubbed")
+IMPULSES = ("solid", "liquid", "alone", "rubbed", "inverse")
 """Arrays of the places of contact that a step leaves to the next."""
 
 ARRIVED = ("conveyed", "inflow")

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
-from .dilatancy import angle_at_rest, greatest_angle, make_dilatancy
+from .dilatancy import angle_at_rest, make_dilatancy, range_of_angles
 from .law import Array, Law
 from .mohr_coulomb import Settings as OfMohrCoulomb
 from .radial import TINY, lateral_range, make_radial, mean_and_shear, slow_stress
@@ -85,7 +86,8 @@ class CoulombViscous(Law):
         if material.mixture_viscosity_Pa_s > 0.0:
             return beyond
         strength, _ = _cone(material)
-        slope = math.sin(greatest_angle(material, math.radians(material.friction_angle_deg)))
+        least, most = range_of_angles(material, math.radians(material.friction_angle_deg))
+        slope = np.where(mean > 0.0, math.sin(least), math.sin(most))  # under tension, friction takes away
         return beyond.clip(min=shear - strength + slope * mean)
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:

@@ -80,12 +80,13 @@ def angle_at_rest(material: Any, angle: float) -> float:
     return max(angle + math.atan(min(max(free, -STEEPEST), STEEPEST)), 0.0)
 
 
-def greatest_angle(material: Any, angle: float) -> float:
-    """The same at the most, of any density [rad]."""
+def range_of_angles(material: Any, angle: float) -> tuple[float, float]:
+    """The same at the least and at the most, of any density [rad]."""
     own = material.dilatancy
     if own is None:
-        return angle
-    return min(angle + math.atan(min(own.coefficient, STEEPEST)), 0.5 * math.pi)
+        return angle, angle
+    steepest = math.atan(min(own.coefficient, STEEPEST))
+    return max(angle - steepest, 0.0), min(angle + steepest, 0.5 * math.pi)
 
 
 def make_dilatancy(types: SimpleNamespace, tools: SimpleNamespace, *, added: bool = False) -> SimpleNamespace:

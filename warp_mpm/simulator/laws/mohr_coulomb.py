@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from warp_mpm.schema import Model, NonNegative
 
-from .dilatancy import angle_at_rest, greatest_angle, make_dilatancy
+from .dilatancy import angle_at_rest, make_dilatancy, range_of_angles
 from .law import Array, Law
 from .principal import make_principal
 
@@ -100,9 +100,10 @@ class MohrCoulomb(Law):
         principal = np.sort(np.stack([mean + radius, mean - radius, zz]), axis=0)
         first, last = principal[2], principal[0]
         angle = math.radians(material.friction_angle_deg)
-        sine, cosine = math.sin(greatest_angle(material, angle)), math.cos(angle)
-        cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * cosine
-        apex = material.cohesion_Pa * cosine / sine if sine > 0.0 else math.inf
+        least, most = range_of_angles(material, angle)
+        sine = np.where(first + last > 0.0, math.sin(least), math.sin(most))  # under tension, friction takes away
+        cone = (1.0 + sine) * first - (1.0 - sine) * last - 2.0 * material.cohesion_Pa * math.cos(angle)
+        apex = material.cohesion_Pa / math.tan(angle) if angle > 0.0 else math.inf
         return np.maximum(cone, first - min(material.tension_cutoff_Pa, apex))
 
     def functions(self, types: SimpleNamespace, tools: SimpleNamespace) -> dict[str, Any]:
