@@ -24,7 +24,7 @@ from warp_mpm.validation.case import (
     reported,
     within,
 )
-from warp_mpm.validation.measured.given import Given, Ladder, simulated
+from warp_mpm.validation.measured.given import SMOOTH, Given, Ladder, simulated
 from warp_mpm.validation.measured.water import (
     DEPTH,
     MOST_SHIFT,
@@ -55,8 +55,12 @@ _RUNS: dict[tuple[Setup, int], Watched] = {}
 def _runs(given: Given, setup: Setup) -> list[Watched]:
     for cells in spacings(given):
         if (setup, cells) not in _RUNS:
-            _RUNS[setup, cells] = watch(setup, cells, [place / DEPTH for place in GAUGES.values()])
+            _RUNS[setup, cells] = _watched(setup, cells)
     return [_RUNS[setup, cells] for cells in spacings(given)]
+
+
+def _watched(setup: Setup, cells: int) -> Watched:
+    return watch(setup, cells, [place / DEPTH for place in GAUGES.values()])
 
 
 # -- Lobovský ----------------------------------------------------------------------------------------------------
@@ -190,7 +194,7 @@ def lobovsky_with_gate(given: Given) -> Outcome:
 
 def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
     runs, reasons = _runs(given, setup), REASONS[setup]
-    by = "simulated" if setup == WALL else "simulated, with gate and held bed"
+    by = SMOOTH if setup == WALL else "water, gate and bed that holds"
     ladder = Ladder([f"H/{run.cells}" for run in runs], by=by)
     traces = {name: [run.pressure(z / DEPTH, SENSOR / DEPTH) for run in runs] for name, z in HEIGHTS.items()}
     arrivals = {
@@ -447,7 +451,8 @@ def _formulas(ladder: Ladder, runs: list[Watched]) -> list[Point]:
         value = pressure / unit
         ladder.checks.append(reported(f"the same by formula: {title}", "-", value, reference=ARRIVING_PRESSURE))
         by = "closed form" if title == MODELS["closed_form"].title else "pressure formulas"
-        points.append(Point(title, by, ARRIVING_PRESSURE, ARRIVING_PRESSURE, ARRIVING_PRESSURE, value, value, value))
+        measured = (ARRIVING_PRESSURE,) * 3
+        points.append(Point(title, by, *measured, value, value, value, label=title.split(" (")[0]))
     return points
 
 
