@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -277,6 +278,7 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
                 ("", *(f"{begin:g}–{begin + 0.5:g}" for begin in WINDOWS)),
                 rows,
             ),
+            *([] if given.quick else [_more_points(runs, setup)]),
         ],
         remarks=[
             "A sensor is 4.2 mm wide; a simulated one is a mean over two cells where these are wider. Grey in the "
@@ -285,6 +287,24 @@ def _against_lobovsky(given: Given, setup: Setup) -> Outcome:
             "with the greatest mean over that depth and 0.1 t*."
         ],
     )
+
+
+def _more_points(runs: list[Watched], setup: Setup) -> Table:
+    """What more material points in a cell change, at the middle spacing; judged are four."""
+    cells = runs[1].cells
+    rows = [("measured", *(number(IMPULSES[name]) for name in HEIGHTS), *(number(v) for v in FILTERED_PEAKS.values()))]
+    for points, run in ((setup.points, runs[1]), (MORE, _watched(replace(setup, points=MORE), cells))):
+        traces = [run.pressure(z / DEPTH, SENSOR / DEPTH) for z in HEIGHTS.values()]
+        arrivals = [_first(run.time, trace) for trace in traces]
+        shift = float(np.mean(np.array(list(ARRIVALS.values())) - arrivals).clip(-MOST_SHIFT, MOST_SHIFT))
+        impulses = (number(_impulse(run, trace, shift)) for trace in traces)
+        rows.append((f"{points} points a cell", *impulses, *(number(_peak(run, trace)) for trace in traces)))
+    columns = ("", *(f"{name}: impulse" for name in HEIGHTS), *(f"{name}: peak" for name in HEIGHTS))
+    return Table(f"What was tried: more points in a cell, H/{cells}; peaks beside the typical event's", columns, rows)
+
+
+MORE = 16
+"""Points in a cell, with which those of the corner at the foot of a wall crowd less."""
 
 
 def _peak(run: Watched, trace: Array) -> float:
