@@ -4,6 +4,7 @@ run of water on a wall. The cases themselves with `slow`."""
 import inspect
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -350,12 +351,12 @@ def test_the_page_shows_the_limit_with_its_reason_as_it_stands_in_the_docstring(
 
 def test_the_picture_of_everything_has_a_point_for_each_figure_that_can_be_drawn():
     points = [simulated("a", 1.0, [1.5, 1.2], band=(0.8, 1.3)), simulated("b", 0.0, [1.0]), simulated("c", 2.0, [3.0])]
-    points += [replace(simulated("d", 2.0, [2.6], by="a formula"), label="Formula")]
+    points += [simulated("too low", 1.0, [0.5]), replace(simulated("d", 2.0, [2.6], by="a formula"), label="Formula")]
     figure = page.everything([Outcome(checks=[], points=points)])
     (axes,) = figure.axes
     assert axes.get_xscale() == axes.get_yscale() == "log"
     told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert told == ["water, smooth bed: 1 of 2", "a formula: 0 of 1"]
+    assert told == ["water, smooth bed: 1 of 3", "a formula: 0 of 1"]
     assert [text.get_text() for text in axes.texts] == ["Formula"]
     assert page.everything([Outcome(checks=[])]) is None
 
@@ -375,6 +376,18 @@ def test_a_verdict_counts_the_judged_alone():
     assert page.verdict(Outcome(checks=checks)) == "**short** (1 of 2)"
     assert page.verdict(Outcome(checks=checks[1:])) == "ok"
     assert page.verdict(Outcome(checks=checks[2:])) == "reported"
+
+
+@pytest.mark.parametrize("name", ["measured", "validation"])
+def test_the_verdicts_of_a_shipped_page_are_those_of_its_tables(name):
+    text = (Path(__file__).parents[2] / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    first, *sections = text.split("\n## ")
+    told = re.findall(r"(?m)^\| \[.*\]\(#.*\) \| (\S.*?) \| .* \| .* s \|$", first)
+    assert len(told) == len(sections) > 5
+    for verdict, section in zip(told, sections, strict=True):
+        short, ok = (len(re.findall(rf"(?m)^\| {mark} \|", section)) for mark in (r"\*\*short\*\*", "ok"))
+        found = f"**short** ({short} of {short + ok})" if short else "ok" if ok else "reported"
+        assert verdict == found, section.splitlines()[0]
 
 
 def test_every_case_states_its_limit_before_it_runs():

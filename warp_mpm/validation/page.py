@@ -196,6 +196,9 @@ def _worst(outcome: Outcome) -> str:
 MOST_LABELS = 6
 """A longer legend stands below its panel, where it hides nothing."""
 
+SECOND_BAND = "#B5651D"
+"""Colour of a second band beside a grey one."""
+
 # -- plots -------------------------------------------------------------------------------------------------------
 
 
@@ -232,8 +235,9 @@ def _labels(panel: Panel) -> list[str]:
 
 def _draw(place: Axes, panel: Panel) -> None:
     colours = iter(RUN_COLOURS * 4)
-    for band in panel.bands:
-        place.fill_between(band.x, band.low, band.high, color=GREY, alpha=0.25, linewidth=0.0, label=band.label or None)
+    for band, colour in zip(panel.bands, (GREY, SECOND_BAND) * len(panel.bands), strict=False):
+        label = band.label or None
+        place.fill_between(band.x, band.low, band.high, color=colour, alpha=0.25, linewidth=0.0, label=label)
     for curve in panel.curves:
         label = curve.label or None
         if curve.style == "reference":

@@ -368,16 +368,16 @@ def debris_flume(given: Given) -> Outcome:
         others += [Setting(start="hydrostatic", internal=SHEARED_AS_MEASURED)]
         others += [Setting(start="hydrostatic", internal=SHEARED_AS_MEASURED, smooth_ends=True)]
     words = (
-        "In the pictures SG is the band that comes first at 32 m, SGM at 66 and 90 m. The bed is the flume's: 82.5 m "
-        "at 31°, an arc of 10 m radius, a pad of 2.5°. The flume is 2 m wide; beside its pad there are no walls, and "
-        "the experiments spread where a plane flow cannot. Depth is volume over area of half a metre of bed; stress "
-        "and pore pressure are means over the lowest cell of it. The skeleton is soft (E = 100 kPa), as the published "
-        "compressibility makes it under some kilopascals. The internal friction is that of the bed; without dilatancy "
-        "it shears at sin φ' of the normal stress, so that the material slips in "
-        f"its lowest cells before the bed does: φ' = {SHEARED_AS_MEASURED:g}°, whose sine is tan 40.7°, has it slide "
-        "on the bed as the friction was measured. The hopper's back is open, its load is 4.95 m² per metre of width. "
-        "The side walls do not rub: with half of the weight across, a friction of 0.5 and 0.15 m of depth they would "
-        "bear 2 % of the weight, which is 4 % of what drives the flow."
+        "SG is the mixture without mud, SGM that with it. The bed is the flume's: 82.5 m at 31°, an arc of 10 m "
+        "radius, a pad of 2.5°. The flume is 2 m wide; beside its pad there are no walls, and the experiments spread "
+        "where a plane flow cannot. Depth is volume over area of half a metre of bed; stress and pore pressure are "
+        "means over the lowest cell of it. The skeleton is soft (E = 100 kPa), as the published compressibility makes "
+        "it under some kilopascals. The internal friction is that of the bed; without dilatancy it shears at sin φ' "
+        "of the normal stress, so that the material slips in its lowest cells before the bed does: φ' = "
+        f"{SHEARED_AS_MEASURED:g}°, whose sine is tan 40.7°, has it slide on the bed as the friction was measured. The "
+        "hopper's back is open, its load is 4.95 m² per metre of width. The side walls do not rub: with half of the "
+        "weight across, a friction of 0.5 and 0.15 m of depth they would bear 2 % of the weight, which is 4 % of what "
+        "drives the flow."
     )
     title = "Every run of the published ranges"
     return _outcome(given, Setting(), others, title, SHORT, words, by="debris, paper's law")
@@ -418,10 +418,9 @@ def debris_flume_dilatancy(given: Given) -> Outcome:
         others += [Setting(start="hydrostatic", mu_i=True), Setting(start="liquefied", mu_i=True)]
         others += [Setting(start="hydrostatic", critical=0.64, mu_i=True)]
     words = (
-        "Bed, gauges and skeleton are those of the case before. In the pictures SG is the band that comes first at 32 "
-        "m, SGM at 66 and 90 m. The row of m_crit = 0.63 is the setting of the published script of these experiments, "
-        "with 31° where the bed has no bumps. The doors of the hopper, gone at once here, opened over 0.74 to 0.77 s; "
-        "over their angle as published, the part of the width that they close "
+        "Bed, gauges and skeleton are those of the case before. The row of m_crit = 0.63 is the setting of the "
+        "published script of these experiments, with 31° where the bed has no bumps. The doors of the hopper, gone at "
+        "once here, opened over 0.74 to 0.77 s; over their angle as published, the part of the width that they close "
         f"adds up to {DOORS:g} s."
     )
     title = "Every run of the published ranges, and of μ(I)"
@@ -450,7 +449,7 @@ def debris_flume_viscous(given: Given) -> Outcome:
         plain = Setting(viscous=viscosity)
         others += [replace(likely, viscous=viscosity), replace(plain, start="hydrostatic"), plain]
         others += [replace(likely, viscous=viscosity, held=True), replace(plain, held=True)]
-    words = "Bed, gauges and skeleton are those of the cases before, and SG and SGM are drawn as there."
+    words = "Bed, gauges and skeleton are those of the cases before."
     title = "Every run with a viscosity of the mixture"
     chosen = others[1:2] if given.quick else others[1:]
     outcome = _outcome(given, likely, chosen, title, VISCOUS, words, by="debris, with a viscosity")
