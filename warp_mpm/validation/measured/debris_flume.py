@@ -455,9 +455,11 @@ def debris_flume_viscous(given: Given) -> Outcome:
     outcome = _outcome(given, likely, chosen, title, VISCOUS, words, by="debris, with a viscosity")
     if given.quick:
         return outcome
-    held = replace(likely, held=True)
-    by_spacing = {f"{spacing:g} m": run_down(held, spacing) for spacing in _spacings(given)}
-    return replace(outcome, tables=[*outcome.tables, _explored_table(by_spacing, f"{held.words}, by spacing")])
+    held = {
+        f"{viscosity:g} Pa s, {spacing:g} m": run_down(replace(likely, viscous=viscosity, held=True), spacing)
+        for viscosity, spacing in product(VISCOSITIES, _spacings(given))
+    }
+    return replace(outcome, tables=[*outcome.tables, _explored_table(held, "On a bed that holds, by spacing")])
 
 
 VISCOUS = ""
