@@ -133,8 +133,8 @@ REASONS = {
         "impulse": "the smooth bed lets the water arrive 15 % too fast, and it turns up the wall in a thin jet with "
         "too much pressure below and too little above, where the experiment has the pressure of standing water from "
         "t* = 3 on; " + NUMERICS + "; nor is it that points crowd at the foot of the wall: sixteen to a cell take 5 % "
-        "off its impulse, which is 26 % too large at that spacing (last table); with the gate and a bed that holds the water, in the "
-        "next case, most of it goes",
+        "off its impulse, which is 26 % too large at that spacing (last table); with the gate and a bed that holds the "
+        "water, in the next case, most of it goes",
         "peak": "3 mm: the filter takes as much from the experiment, whose typical event falls to 2.20; 30 and 80 mm: "
         "the thin jet presses below them",
         "level": "until t* = 5 all levels are within some percent of H; what falls back from the wall afterwards is "
