@@ -3,6 +3,8 @@ run of water on a wall. The cases themselves with `slow`."""
 
 import inspect
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +12,9 @@ from typer.testing import CliRunner
 
 from warp_mpm.cli import app
 from warp_mpm.validation import page
-from warp_mpm.validation.case import Check, Outcome, Panel, compared
+from warp_mpm.validation.case import Check, Outcome, Panel, compared, reported
 from warp_mpm.validation.measured import catalogue, debris_flume, loose_wedge, water_on_a_wall
-from warp_mpm.validation.measured.given import Given, Ladder, measured_case, simulated
+from warp_mpm.validation.measured.given import SMOOTH, Given, Ladder, measured_case, simulated
 from warp_mpm.validation.measured.tables import KNOWN, Tables, read_table
 from warp_mpm.validation.measured.water import RECORD, WALL, Setup, Watched, best_shift, spacings, watch
 
@@ -170,7 +172,7 @@ def test_what_was_measured_is_within_its_limits(monkeypatch):
     assert [check.quantity for check in outcome.short] == []
     assert len([check for check in outcome.checks if check.passed]) == 23
     assert all(point.computed == pytest.approx(point.measured, rel=0.02) for point in outcome.points
-               if point.by == "simulated" and "lowest" not in point.quantity and "slope" not in point.quantity
+               if point.by == SMOOTH and "lowest" not in point.quantity and "slope" not in point.quantity
                )  # fmt: skip
 
 
@@ -219,7 +221,10 @@ def flume(monkeypatch, run, case=debris_flume.debris_flume):
     return case(Given(quick=True))
 
 
-FLUMES = pytest.mark.parametrize("case", [debris_flume.debris_flume, debris_flume.debris_flume_dilatancy])
+FLUMES = pytest.mark.parametrize(
+    "case",
+    [debris_flume.debris_flume, debris_flume.debris_flume_dilatancy, debris_flume.debris_flume_viscous],
+)
 
 
 @FLUMES
@@ -244,7 +249,8 @@ def test_a_flow_that_never_arrives_falls_short(monkeypatch):
 
 @FLUMES
 def test_every_run_of_the_flume_is_of_the_published_ranges(monkeypatch, case):
-    """But for the friction of two variants, which say so: a bed without bumps, a material that shears as it does."""
+    """But for the friction of three variants, which say so: a bed without bumps, one that holds, and a material that
+    shears as the bed does."""
     settings = []
 
     def noted(setting, spacing):
@@ -258,8 +264,10 @@ def test_every_run_of_the_flume_is_of_the_published_ranges(monkeypatch, case):
         assert 1e-12 <= setting.permeability <= 1e-8
         assert 0.005 <= setting.fluid <= 0.05
         assert setting.critical is None or 0.62 <= setting.critical <= 0.66
+        assert setting.viscous is None or 2.1 <= setting.viscous <= 9.5
+        assert not setting.held or "bed that holds" in setting.words
     rows = outcome.tables[1].rows
-    assert len(rows) == len(set(settings)) + 1
+    assert len(rows) == len(set(settings)) + 1  # and what was measured
     assert [row[0] for row in rows[:-1]] == [setting.words for setting in dict.fromkeys(settings)]
 
 
@@ -343,11 +351,43 @@ def test_the_page_shows_the_limit_with_its_reason_as_it_stands_in_the_docstring(
 
 def test_the_picture_of_everything_has_a_point_for_each_figure_that_can_be_drawn():
     points = [simulated("a", 1.0, [1.5, 1.2], band=(0.8, 1.3)), simulated("b", 0.0, [1.0]), simulated("c", 2.0, [3.0])]
+    points += [simulated("too low", 1.0, [0.5]), replace(simulated("d", 2.0, [2.6], by="a formula"), label="Formula")]
     figure = page.everything([Outcome(checks=[], points=points)])
     (axes,) = figure.axes
     assert axes.get_xscale() == axes.get_yscale() == "log"
-    assert "simulated (2)" in [text.get_text() for text in axes.get_legend().get_texts()]
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert told == ["water, smooth bed: 1 of 3", "a formula: 0 of 1"]
+    assert [text.get_text() for text in axes.texts] == ["Formula"]
     assert page.everything([Outcome(checks=[])]) is None
+
+
+def test_the_picture_of_everything_keeps_a_figure_of_which_nothing_is_left():
+    points = [simulated("a", 1.0, [1.1]), simulated("passed already", 2.0, [0.0])]
+    (axes,) = page.everything([Outcome(checks=[], points=points)]).axes
+    hollow = [line for line in axes.lines if line.get_markerfacecolor() == "none"]
+    assert [(line.get_xdata().tolist(), line.get_ydata().tolist()) for line in hollow] == [
+        ([2.0], [axes.get_ylim()[0]])
+    ]
+    assert axes.get_legend().get_texts()[0].get_text().endswith("1 of 2")
+
+
+def test_a_verdict_counts_the_judged_alone():
+    checks = [compared("a", "m", 2.0, 1.0, 0.1), compared("b", "m", 1.0, 1.0, 0.1), reported("c", "m", 1.0)]
+    assert page.verdict(Outcome(checks=checks)) == "**short** (1 of 2)"
+    assert page.verdict(Outcome(checks=checks[1:])) == "ok"
+    assert page.verdict(Outcome(checks=checks[2:])) == "reported"
+
+
+@pytest.mark.parametrize("name", ["measured", "validation"])
+def test_the_verdicts_of_a_shipped_page_are_those_of_its_tables(name):
+    text = (Path(__file__).parents[2] / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    first, *sections = text.split("\n## ")
+    told = re.findall(r"(?m)^\| \[.*\]\(#.*\) \| (\S.*?) \| .* \| .* s \|$", first)
+    assert len(told) == len(sections) > 5
+    for verdict, section in zip(told, sections, strict=True):
+        short, ok = (len(re.findall(rf"(?m)^\| {mark} \|", section)) for mark in (r"\*\*short\*\*", "ok"))
+        found = f"**short** ({short} of {short + ok})" if short else "ok" if ok else "reported"
+        assert verdict == found, section.splitlines()[0]
 
 
 def test_every_case_states_its_limit_before_it_runs():
@@ -392,6 +432,7 @@ KNOWN_SHORT: dict[str, tuple[str, ...]] = {
     "loose-wedge": ("head in the middle", "way of the surface"),
     "debris-flume": ("share of the times behind the front", "arrival at"),
     "debris-flume-dilatancy": ("share of the times behind the front", "arrival at"),
+    "debris-flume-viscous": ("share of the times behind the front", "arrival at"),
 }
 """Checks that miss their limit today, by words of their quantity; the page tells why."""
 

@@ -187,13 +187,15 @@ class Point:
 
     quantity: str
     by: str
-    """What computed it: `simulated`, or a formula's name."""
+    """What computed it, in words."""
     measured: float
     measured_low: float
     measured_high: float
     computed: float
     computed_low: float
     computed_high: float
+    label: str = ""
+    """Written beside it in the picture of all figures."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,6 +64,15 @@ def measured_cases(given: Given) -> tuple[Case, ...]:
             given,
         ),
         measured_case(
+            "debris-flume-viscous",
+            "Debris in a flume of 95 m, with a viscosity of the mixture",
+            "The same with dilatancy and a viscosity of the mixture beside the friction of its grains, on the bed's "
+            "friction and on a bed that holds.",
+            "as above; viscosities measured on coarse debris (Geotechnics 2025, 5(2), 37)",
+            debris_flume.debris_flume_viscous,
+            given,
+        ),
+        measured_case(
             "loose-wedge",
             "A loose wedge that liquefied as it failed",
             "About 6 m³ of loose sand and gravel behind a wall on a bed of 31°, brought to failure by water: pore "

@@ -11,6 +11,9 @@ import numpy as np
 from warp_mpm.validation.case import Case, Check, Outcome, Point, Table, number
 from warp_mpm.validation.measured.tables import Tables
 
+SMOOTH = "water, smooth bed"
+"""What most figures of the picture of all are computed with, in its words."""
+
 
 @dataclass(frozen=True)
 class Given:
@@ -47,7 +50,7 @@ def simulated(
     values: Sequence[float],
     *,
     band: tuple[float, float] | None = None,
-    by: str = "simulated",
+    by: str = SMOOTH,
 ) -> Point:
     """A figure of the finest of several spacings; its bar reaches to that of the spacing before.
 
@@ -65,7 +68,7 @@ def simulated(
 class Ladder:
     """Figures at several spacings, coarsest first; the finest one is judged."""
 
-    def __init__(self, spacings: Sequence[str], *, by: str = "simulated"):
+    def __init__(self, spacings: Sequence[str], *, by: str = SMOOTH):
         """Args: spacings: as they are printed; by: what computes, in words of the picture of all figures."""
         self.spacings = spacings
         self.by = by

@@ -149,6 +149,9 @@ def loose_wedge(given: Given) -> Outcome:
     now those published for this very experiment, where a guess and the flume's likely 0.03 had stood; the stress at the
     start is alike in all directions and Poisson's ratio 0, as the law for which a was published knows no shear
     stiffness. What each of these does is on the page.)
+
+    A miss of the heads means (said after the runs) that shearing and pore pressure are not coupled as they were, one of
+    the ways that what held the wedge back is not in the model.
     """
     spacings = (0.1,) if given.quick else (0.08 / given.finer, 0.05 / given.finer)
     curves, moved = [reference(TIMES, HEADS, "measured")], [reference(TIMES, WAYS, "measured")]

@@ -74,6 +74,8 @@ class Setup:
     """Speed over √(g H) at which a gate is lifted; None: it is gone at once."""
     held: bool = False
     """The bed holds the water that touches it, which has the viscosity of water; false: it is smooth."""
+    points: int = 4
+    """Material points per cell."""
 
 
 WALL = Setup(width=2.0, bed=1.61 / 0.3, end=7.5, wall=True, ceiling=2.0)
@@ -137,6 +139,7 @@ def watch(setup: Setup, cells: int, gauges: Sequence[float] = ()) -> Watched:
             ground=NO_SLIP if setup.held else 0.0,
             barrier=fixed({"kind": "wall"}) if setup.wall else None,
             spacing_m=spacing,
+            points_per_cell=setup.points,
             domain=domain,
         ),
         bodies=_gate(setup, spacing),
