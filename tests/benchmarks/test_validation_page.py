@@ -17,6 +17,7 @@ from warp_mpm.validation.case import (
     Table,
     at_most,
     compared,
+    falls,
     holds,
     reference,
     reported,
@@ -69,6 +70,9 @@ def only_made_up(monkeypatch):
         (within("", "", 2.0, 1.0, 2.0), True),
         (within("", "", 2.1, 1.0, 2.0), False),
         (holds("", "", 1.0, False), False),
+        (falls("", [0.04, 0.027]), True),
+        (falls("", [0.04, 0.029]), False),
+        (falls("", [0.04, 0.029], left=0.03), True),
         (reported("", "", 1.0, reference=9.0), None),
     ],
 )

@@ -72,7 +72,7 @@ def test_buys_runs_and_settles(coarse: Path, tmp_path: Path, monkeypatch: pytest
     assert f"Chosen: spacing {chosen:g} m" in result.stderr
 
 
-@pytest.mark.slow  # 26 runs; test_accuracy.py checks each part of it on runs that are made up
+@pytest.mark.slow  # 26 runs; accuracy/ checks each part of it on runs that are made up
 def test_ladders_of_several_scenes_and_their_data(
     coarse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -110,6 +110,16 @@ def holds(statement: str, unit: str, ours: float, true: bool, *, reference: str 
     )
 
 
+def falls(
+    statement: str, errors: Sequence[float], *, left: float = 0.0, scale: float = 1.0, of: str = "errors"
+) -> Check:
+    """Errors at spacings, coarse first, fall: the last is less than 0.7 of the first, or less than `left`. They are
+    told as shares of `scale`, which `of` names."""
+    told = ", ".join(f"{100 * error / scale:.2g} %" for error in errors)
+    true = errors[-1] < 0.7 * errors[0] or errors[-1] < left
+    return holds(statement, "-", errors[-1] / errors[0], true, reference=f"< 0.7; {of} {told}")
+
+
 def reported(quantity: str, unit: str, ours: float, *, reference: float | None = None, remark: str = "") -> Check:
     """A number that is not judged; beside a reference its difference is shown."""
     error = abs(ours - reference) / abs(reference) if reference else None

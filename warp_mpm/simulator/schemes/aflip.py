@@ -51,8 +51,8 @@ class Aflip(Flip):
         read, write, add, larger = tools.read, tools.write, tools.add, tools.larger
         nine, part = tools.nine, tools.part
         TWO_PHASE = types.effects.two_phase
-        SPATIAL = types.dimensions == 3
-        kept, gained = make_kept(types, tools)
+        kept, gain = make_kept(types, tools)
+        affine = Apic().functions(types, tools)
         solid_of, liquid_of, of_phases = tools.solid_of, tools.liquid_of, tools.of_phases
         M: Any = wp.types.matrix((3, 3), F)
 
@@ -132,10 +132,7 @@ class Aflip(Flip):
             write(points.affine_x, p, x)
             write(points.affine_y, p, y)
 
-            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
-            write(points.velocity, p, new)
-            write(points.advection, p, solid_of(smooth))
-            return new
+            return gain(points, p, increment, smooth, share, time_step, parameters)
 
         @wp.func
         def turned(x: X, y: X, z: X, time_step: F) -> M:
@@ -194,28 +191,14 @@ class Aflip(Flip):
             write(points.affine_y, p, of_phases(column_of(solid, 1), column_of(liquid, 1)))
             write(points.affine_z, p, of_phases(column_of(solid, 2), column_of(liquid, 2)))
 
-            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
-            write(points.velocity, p, new)
-            write(points.advection, p, solid_of(smooth))
-            return new
-
-        @wp.func
-        def start_across(points: Points, p: wp.int32, masses: V, parameters: Parameters) -> V:
-            return parameters.spacing * wp.cw_mul(masses, read(points.affine_z, p))
-
-        @wp.func
-        def halt(points: Points, p: wp.int32):
-            write(points.affine_x, p, V())
-            write(points.affine_y, p, V())
-            if SPATIAL:
-                write(points.affine_z, p, V())
+            return gain(points, p, increment, smooth, share, time_step, parameters)
 
         return super().functions(types, tools) | {
             "start": start,
-            "start_across": start_across,
+            "start_across": affine["start_across"],
             "column": column,
             "deposit": deposit,
             "collect": collect,
             "collect_in_space": collect_in_space,
-            "halt": halt,
+            "halt": affine["halt"],
         }

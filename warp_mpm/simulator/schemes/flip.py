@@ -17,14 +17,15 @@ class Settings(Model):
 
 
 def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]:
-    """Build `kept(time_step, parameters)`, the share of its own velocity that a point keeps in a step, and `gained`,
-    its velocity afterwards."""
+    """Build `kept(time_step, parameters)`, the share of its own velocity that a point keeps in a step, and `gain`,
+    which gives it its velocity afterwards."""
     import warp as wp
 
-    F, V, Parameters = types.scalar, types.V, types.Parameters
+    F, V, Points, Parameters = types.scalar, types.V, types.Points, types.Parameters
     TWO_PHASE = types.effects.two_phase
     MATERIALS = types.effects.materials
     of_phases, solid_of, liquid_of = tools.of_phases, tools.solid_of, tools.liquid_of
+    read, write = tools.read, tools.write
 
     @wp.func
     def kept(time_step: F, parameters: Parameters) -> F:
@@ -50,7 +51,14 @@ def make_kept(types: SimpleNamespace, tools: SimpleNamespace) -> tuple[Any, Any]
                 new = of_phases(solid, liquid)
         return new
 
-    return kept, gained
+    @wp.func
+    def gain(points: Points, p: wp.int32, increment: V, smooth: V, share: F, time_step: F, parameters: Parameters) -> V:
+        new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
+        write(points.velocity, p, new)
+        write(points.advection, p, solid_of(smooth))
+        return new
+
+    return kept, gain
 
 
 class Flip(Scheme):
@@ -73,8 +81,7 @@ class Flip(Scheme):
         F, V3, V, X = types.scalar, types.V3, types.V, types.X
         Points, Grid, Parameters = types.Points, types.Grid, types.Parameters
         read, write, add = tools.read, tools.write, tools.add
-        kept, gained = make_kept(types, tools)
-        solid_of = tools.solid_of
+        kept, gain = make_kept(types, tools)
 
         @wp.func
         def start(points: Points, p: wp.int32, masses: V, gravity: V, time_step: F, parameters: Parameters):
@@ -137,10 +144,7 @@ class Flip(Scheme):
                 for m in range(3):
                     increment += (wx[k] * wy[m]) * read(grid.increment, first + k * parameters.rows + m)
             share = kept(time_step, parameters)
-            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
-            write(points.velocity, p, new)
-            write(points.advection, p, solid_of(smooth))
-            return new
+            return gain(points, p, increment, smooth, share, time_step, parameters)
 
         @wp.func
         def collect_in_space(
@@ -165,10 +169,7 @@ class Flip(Scheme):
                         node = first + q * parameters.layer + k * parameters.rows + m
                         increment += (wz[q] * wx[k] * wy[m]) * read(grid.increment, node)
             share = kept(time_step, parameters)
-            new = gained(read(points.velocity, p), increment, smooth, share, time_step, parameters)
-            write(points.velocity, p, new)
-            write(points.advection, p, solid_of(smooth))
-            return new
+            return gain(points, p, increment, smooth, share, time_step, parameters)
 
         @wp.func
         def displacement(
