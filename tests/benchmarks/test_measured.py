@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from warp_mpm.cli import app
 from warp_mpm.validation import page
-from warp_mpm.validation.case import Check, Outcome, Panel, compared, reported
+from warp_mpm.validation.case import Band, Check, Outcome, Panel, compared, reported
 from warp_mpm.validation.measured import catalogue, debris_flume, loose_wedge, water_on_a_wall
 from warp_mpm.validation.measured.given import SMOOTH, Given, Ladder, measured_case, simulated
 from warp_mpm.validation.measured.tables import KNOWN, Tables, read_table
@@ -380,6 +380,13 @@ def test_the_picture_of_everything_keeps_a_figure_of_which_nothing_is_left():
         ([2.0], [axes.get_ylim()[0]])
     ]
     assert axes.get_legend().get_texts()[0].get_text().endswith("1 of 2")
+
+
+def test_two_bands_of_a_panel_are_told_apart():
+    bands = [Band([0.0, 1.0], [0.0, 0.0], [1.0, 1.0], name) for name in ("one", "other")]
+    (axes,) = page.drawn([Panel("p", "x", "y", [], bands=bands)]).axes
+    one, other = (shade.get_facecolor()[0, :3].tolist() for shade in axes.collections)
+    assert one != other
 
 
 def test_a_verdict_counts_the_judged_alone():
