@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 
 from warp_mpm.cli import app
 from warp_mpm.validation import page
-from warp_mpm.validation.case import Check, Outcome, Panel, compared, reported
+from warp_mpm.validation.case import Band, Check, Outcome, Panel, compared, reported
 from warp_mpm.validation.measured import catalogue, debris_flume, loose_wedge, water_on_a_wall
 from warp_mpm.validation.measured.given import SMOOTH, Given, Ladder, measured_case, simulated
 from warp_mpm.validation.measured.tables import KNOWN, Tables, read_table
 from warp_mpm.validation.measured.water import RECORD, WALL, Setup, Watched, best_shift, spacings, watch
+from warp_mpm.validation.scenes import scene
 
 runner = CliRunner()
 
@@ -253,7 +254,7 @@ def test_every_run_of_the_flume_is_of_the_published_ranges(monkeypatch, case):
     shears as the bed does."""
     settings = []
 
-    def noted(setting, spacing):
+    def noted(setting, spacing, end=0.0):
         settings.append(setting)
         return passed()
 
@@ -268,7 +269,17 @@ def test_every_run_of_the_flume_is_of_the_published_ranges(monkeypatch, case):
         assert not setting.held or "bed that holds" in setting.words
     rows = outcome.tables[1].rows
     assert len(rows) == len(set(settings)) + 1  # and what was measured
-    assert [row[0] for row in rows[:-1]] == [setting.words for setting in dict.fromkeys(settings)]
+    assert {row[0] for row in rows[:-1]} == {setting.words for setting in settings}
+
+
+def test_a_viscosity_of_the_flume_is_the_law_s():
+    setting = debris_flume.Setting(critical=0.64, viscous=2.1)
+    made = scene("a", debris_flume.HOPPER, "two_phase", end_time=1.0, soil=setting.soil)
+    assert made.flow.material.law == "coulomb_viscous"
+    assert made.flow.material.mixture_viscosity_Pa_s == 2.1
+    assert made.flow.material.friction_angle_deg == 40.7
+    assert made.flow.material.dilatancy.critical_solid_fraction == 0.64
+    assert "mixture_viscosity_Pa_s" not in debris_flume.Setting().soil
 
 
 def test_the_flume_bends_to_its_pad():
@@ -369,6 +380,13 @@ def test_the_picture_of_everything_keeps_a_figure_of_which_nothing_is_left():
         ([2.0], [axes.get_ylim()[0]])
     ]
     assert axes.get_legend().get_texts()[0].get_text().endswith("1 of 2")
+
+
+def test_two_bands_of_a_panel_are_told_apart():
+    bands = [Band([0.0, 1.0], [0.0, 0.0], [1.0, 1.0], name) for name in ("one", "other")]
+    (axes,) = page.drawn([Panel("p", "x", "y", [], bands=bands)]).axes
+    one, other = (shade.get_facecolor()[0, :3].tolist() for shade in axes.collections)
+    assert one != other
 
 
 def test_a_verdict_counts_the_judged_alone():

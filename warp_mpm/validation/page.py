@@ -292,7 +292,9 @@ def everything(outcomes: Sequence[Outcome]) -> Figure | None:
             markersize=4.5, elinewidth=0.8, capsize=1.5, linewidth=0.0,
         )  # fmt: skip
         nothing = [point.measured for point in own if point.computed <= 0.0]
-        place.plot(nothing, np.full(len(nothing), ends[0]), mark, color=colour, markerfacecolor="none", clip_on=False)
+        if nothing:
+            at_edge = np.full(len(nothing), ends[0])
+            place.plot(nothing, at_edge, mark, color=colour, markerfacecolor="none", clip_on=False)
     place.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="measured", ylabel="computed", aspect="equal")
     _name([point for point in points if point.label and point.computed > 0.0], place)
     place.set_title("Everything measured against everything computed, each in its own unit", fontsize=10)
