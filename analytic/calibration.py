@@ -128,6 +128,11 @@ def measure(time: Array, force: Array, filter_window: float = FILTER_WINDOW) -> 
         raise CalibrationError("time and force must be finite, and time must increase.")
     if not (math.isfinite(filter_window) and filter_window >= 0):
         raise CalibrationError(f"filter_window is {filter_window:g}, it must be a number in [0, inf).")
+    length = max(FILTER_WINDOW, float(time[-1] - time[0]))
+    if filter_window > length:
+        raise CalibrationError(
+            f"filter_window is {filter_window:g}, it must be at most {length:g} s, the record's length."
+        )
     filtered = moving_mean(time, force, filter_window)
     peak = filtered_peak(filtered)
     if not (force.max() > 0 and filtered[peak] > 0):

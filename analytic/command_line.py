@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import re
 import signal
 import threading
@@ -112,6 +113,7 @@ class CommandLine(TyperGroup):
             _as_plain_text(command)
 
     def main(self, *arguments: Any, **options: Any) -> Any:
+        os.environ["MPLBACKEND"] = "agg"  # pictures go to files; what else is set may not be there
         with standard_streams() as output, ended_as_by_ctrl_c():
             try:
                 return super().main(*arguments, **options)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from analytic.empirical import EmpiricalModel
 from analytic.impact import STANDARD_GRAVITY
+from analytic.whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -255,4 +256,4 @@ def write_events(events: Events, path: str | Path, remarks: Iterable[str] = ()) 
     lines.append("density [kg/m3],speed [m/s],height [m],peak_pressure [kPa]")
     for row in zip(events.density, events.speed, events.height, events.peak_pressure / 1e3, strict=True):
         lines.append("{:.1f},{:.4f},{:.4f},{:.4f}".format(*row))
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(Path(path), "\n".join(lines) + "\n")

@@ -123,10 +123,11 @@ class Scene:
                 f"kg/m; {1e3 * self.barrier_mass:g} was probably meant, the value is in t/m."
             )
         if self.base_friction is not None and self.base_friction > 2.0:
+            tangent = math.tan(math.radians(self.base_friction))
+            meant = f"; where degrees were meant, {tangent:.2g}" if self.base_friction < 90.0 else ""
             found.append(
                 f"base_friction = {self.base_friction:g} is the tangent of "
-                f"{math.degrees(math.atan(self.base_friction)):.0f} degrees; where degrees were meant, "
-                f"{math.tan(math.radians(self.base_friction)):.2g}."
+                f"{math.degrees(math.atan(self.base_friction)):.0f} degrees{meant}."
             )
         if self.speed > 30.0:
             found.append(f"speed = {self.speed:g} m/s is above any debris flow's; in km/h, {self.speed / 3.6:.3g} m/s.")

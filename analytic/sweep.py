@@ -16,6 +16,7 @@ from typing import Any
 from analytic.calibration import CalibrationError, at_rest, measure, measured_key_figures, measured_vertical_load_ratio
 from analytic.scene import Scene, SceneError, read_scene
 from analytic.time_series import read_time_series
+from analytic.whole_file import whole_file
 
 RANGES = {
     "froude_number": (1.0, 5.0),
@@ -213,7 +214,7 @@ def collect(folder: Path) -> Run:
 
 def write_table(runs: Iterable[Run], path: Path, remark: str = "") -> None:
     """Write the table; `remark` becomes a comment in its first line."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
         if remark:
             file.write(f"# {remark}\n")
         writer = csv.writer(file)

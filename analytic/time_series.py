@@ -85,6 +85,9 @@ def read_time_series(path: str | Path) -> Series:
 
 def _columns(path: Path, header: str) -> dict[str, tuple[int, float]]:
     found: dict[str, tuple[int, float]] = {}
+    if "," not in header and (";" in header or "\t" in header):
+        between = "semicolons" if ";" in header else "tabs"
+        raise TimeSeriesError(f"{path}: there are {between} between its columns, where there must be commas.")
     for place, cell in enumerate(header.split(",")):
         name, _, unit = (part.strip() for part in cell.partition("["))
         if name not in UNITS:

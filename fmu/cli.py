@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from analytic.command_line import add_version
+from analytic.whole_file import write_whole
 from warp_mpm.commands.options import ScenarioCommandLine, with_options
 from warp_mpm.shipped import where_to_get
 
@@ -362,7 +363,7 @@ def _compare(
     table = _comparison(found)
     try:
         plots.save(cross_check_figure(found), picture)
-        written.write_text(_markdown(*table), encoding="utf-8")
+        write_whole(written, _markdown(*table))
     except OSError as error:
         _refuse(f"{out} cannot be written: {error.strerror or error}.")
     content.append({"scenario": str(file), "figure": str(picture), "table": str(written), **found.as_dict()})

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from analytic.cli.predict import option
-from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
+from analytic.cli.terminal import AsJson, Plot, check_plot, check_sizes, number, print_json, print_table, write_plot
 from analytic.command_line import refusals
 from analytic.fitted import beyond_fit
 from analytic.impact import STANDARD_GRAVITY, friction_deceleration
@@ -102,7 +102,7 @@ def design(
         option("--barrier-density", help=f"Density [kg/m³]; the scenario's, or {ASSUMED_DENSITY:g} if it has none."),
     ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Number of samples.")] = 1_000_000,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random numbers.")] = 1,
     gravity: Annotated[
         float | None, option("--gravity", help=f"g [m/s²]; the scenario's, or {STANDARD_GRAVITY}.")
     ] = None,
@@ -145,6 +145,8 @@ def design(
             values[name] = inputs.choose(name, None if text is None else parse(name, text), assumed)
         if barrier_mass is not None:
             values["barrier_mass"] = inputs.choose("barrier_mass", parse("barrier_mass", barrier_mass), None)
+        sizes = {"limit": limit, "gravity": gravity, "slope": slope, "height": height, "crest_width": crest_width}
+        check_sizes(values | sizes | {"barrier_density": barrier_density, "face_angle": face_angle})
         medians = {name: _median(value, name) for name, value in values.items()}
         scene = Scene(
             flow_mass=medians["density"] * medians["flow_length"] * medians["flow_height"],

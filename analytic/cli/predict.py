@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
+from analytic.cli.terminal import AsJson, Plot, check_plot, check_sizes, number, print_json, print_table, write_plot
 from analytic.command_line import refusals
 from analytic.fitted import CALIBRATED, beyond_fit, coefficients
 from analytic.impact import STANDARD_GRAVITY, VARIANTS, Impact
@@ -77,17 +77,19 @@ def predict(
             "slope": slope,
             "face_angle": face_angle,
         }
-        scene = assemble(scenario, given, fixed)
-        notes = [*(scene.doubts if scenario is None else ()), *scene.notes]
         given_model = {
             "s1max": s1max,
             "geometry_change": geometry_change,
             "rise_ratio": rise_ratio,
             "vertical_load_ratio": vertical_load_ratio,
         }
+        motion = {"barrier_initial_velocity": barrier_initial_velocity, "arrival_time": arrival_time}
+        check_sizes(given | given_model | motion | {"reference_speed": reference_speed})
+        scene = assemble(scenario, given, fixed)
+        notes = [*(scene.doubts if scenario is None else ()), *scene.notes]
         model, assumed = choose_model(scene, variant, given_model)
         notes += assumed
-        model |= {"barrier_initial_velocity": barrier_initial_velocity, "arrival_time": arrival_time}
+        model |= motion
         impact = make_impact(scene, model, reference_speed)
         if as_json:
             print_json(_results(impact) | {"inputs": _inputs(impact), "notes": notes})

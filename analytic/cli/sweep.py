@@ -10,6 +10,7 @@ import typer
 
 from analytic.cli.terminal import AsJson, Plot, check_plot, number, print_json, print_table, write_plot
 from analytic.command_line import refusals
+from analytic.whole_file import write_whole
 
 sweep = typer.Typer(help="Fit the calibrated variant to a sweep of simulations.", no_args_is_help=True)
 
@@ -39,7 +40,7 @@ def plan(
         planned = scenes.plan(content, count, seed)
         folder.mkdir(parents=True, exist_ok=True)
         for name, scene in planned.items():
-            (folder / f"{name}.json").write_text(json.dumps(scene, indent=2) + "\n", encoding="utf-8")
+            write_whole(folder / f"{name}.json", json.dumps(scene, indent=2) + "\n")
         typer.echo(f"{len(planned)} scenarios in {folder}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +16,18 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, 
 Plot = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a png, pdf or svg file.")
 ]
+
+
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Sizes [SI] of the numbers that may be given: no impact has others, and products of them stay numbers."""
+
+
+def check_sizes(given: Mapping[str, Any]) -> None:
+    """Refuse numbers, also of a distribution, with which the formulas cannot be computed."""
+    for name, value in given.items():
+        for number in getattr(value, "parameters", value if isinstance(value, tuple) else (value,)):
+            if number and math.isfinite(number) and not SMALLEST <= abs(number) <= LARGEST:
+                raise ValueError(f"{name} is {value}, it must be nil or from {SMALLEST:g} to {LARGEST:g} in size.")
 
 
 def print_json(content: Any) -> None:

@@ -221,6 +221,12 @@ TIME = np.linspace(0, 1, 101)
         (TIME, np.full(101, np.nan), {}, "must be finite"),
         (TIME[::-1], np.ones(101), {}, "time must increase"),
         (TIME, np.sin(3 * TIME), {"filter_window": -1.0}, "filter_window is -1"),
+        (
+            TIME,
+            np.sin(3 * TIME),
+            {"filter_window": 5.0},
+            "filter_window is 5, it must be at most 1 s, the record's length",
+        ),
         (TIME, np.sin(3 * TIME), {"rule": "best"}, "rule is 'best', it must be one of peak, least_squares"),
     ],
 )
@@ -245,6 +251,7 @@ def test_reads_units_and_leaves_an_unfinished_line(tmp_path: Path) -> None:
         ("time [s],force\n0,0\n1,1\n2,2\n", r"column impact_force_x \[N/m\] is missing"),
         ("time [h],impact_force_x [N/m]\n0,0\n1,1\n2,2\n", r"column time has the unit 'h', .* \[s\], \[ms\]"),
         ("time,impact_force_x [N/m]\n0,0\n1,1\n2,2\n", r"column time has the unit ''"),
+        ("time [s];impact_force_x [N/m]\n0;0\n1;1\n2;2\n", r"there are semicolons between its columns, .* commas"),
         ("time [s],impact_force_x [N/m]\n0,0\n1,1\n", r"fewer than three samples"),
         ("time [s],impact_force_x [N/m]\n0,0\n1,x\n2,2\n", r"something else than rows of numbers"),
         ("time [s],impact_force_x [N/m]\n0,0\n1,1\n1,2\n", r"line 4: time does not increase"),

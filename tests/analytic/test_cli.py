@@ -535,3 +535,38 @@ def test_design_says_how_far_off_it_may_be_and_what_does_better() -> None:
     notes = answer("design", str(SCENARIOS / "case_1.json"), "--limit", "1")["notes"]
     assert "off by a factor of two" in " ".join(notes)
     assert "python -m warp_mpm design SCENARIO" in " ".join(notes)
+
+
+SIZE = "it must be nil or from 1e-12 to 1e+12 in size."
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "sentence"),
+    [
+        ("predict", ["--speed", "1e300"], f"--speed = 1e+300 is not allowed; {SIZE}"),
+        ("predict", ["--flow-length", "1e308"], f"--flow-length = 1e+308 is not allowed; {SIZE}"),
+        ("predict", ["--lambda", "5e-324"], f"--lambda = 5e-324 is not allowed; {SIZE}"),
+        ("predict", ["--arrival-time", "1e308"], f"--arrival-time = 1e+308 is not allowed; {SIZE}"),
+        ("predict", ["--reference-speed", "1e-308"], f"--reference-speed = 1e-308 is not allowed; {SIZE}"),
+        ("design", ["--density", "1e300"], f"--density = 1e+300 is not allowed; {SIZE}"),
+        ("design", ["--speed", "lognormal(1e200, 0.1)"], f"--speed = lognormal(1e+200, 0.1) is not allowed; {SIZE}"),
+        ("design", ["--seed", "-1"], "--seed = -1 is not allowed; it must be a whole number at least 0."),
+    ],
+)
+def test_numbers_of_no_impact_are_refused(command, options, sentence):
+    """Of such sizes the formulas' products are none any longer: a design went on for ever."""
+    common = ["--flow-length", "15", "--flow-height", "3", "--speed", "10", "--base-friction", "0.29"]
+    own = (
+        ["--flow-mass", "8e4", "--barrier-mass", "8e4"]
+        if command == "predict"
+        else ["--density", "1800", "--limit", "1"]
+    )
+    result = CliRunner().invoke(app, [command, *own, *common, *options])
+    assert (result.exit_code, result.stderr.strip()) == (2, sentence)
+
+
+def test_no_angle_is_read_into_a_friction_that_cannot_be_one():
+    words = "predict --flow-mass 8e4 --barrier-mass 8e4 --flow-length 15 --flow-height 3 --speed 10 --base-friction"
+    notes = {value: CliRunner().invoke(app, [*words.split(), value]).stdout for value in ("20", "1e9")}
+    assert "where degrees were meant, 0.36." in notes["20"]
+    assert "is the tangent of 90 degrees." in notes["1e9"]

@@ -153,7 +153,7 @@ def assert_stable(data):
     note(scenario.model_dump_json())
     assert measured.problem is None, measured.problem
     unmet = {criterion.figure: value for criterion, value in measured.failures(scenario)}
-    if unmet.get("energy_error", 1.0) < 0.5:
+    if "energy_error" in unmet:
         # What crowds is compressed against its own pressure, and friction alone takes that energy: docs/limits.md.
         plain = measure(scenario.replaced({"numerics.density_correction": 0.0}))
         if "energy_error" not in {criterion.figure for criterion, _ in plain.failures(scenario)}:

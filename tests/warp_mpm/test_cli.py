@@ -107,9 +107,10 @@ def test_an_existing_run_needs_force(command):
         (("--spacing", "-1"), "--spacing = -1.0 is not allowed"),
         (("--spacing", "nan"), "--spacing = NaN is not allowed"),
         (("--until", "0"), "--until = 0.0 is not allowed"),
+        (("--until", "5e-324"), "--until = 5e-324 is not allowed"),
         (
             ("--until", "soon"),
-            "--until = soon is not allowed; it must be a finite number greater than 0 and at most 1e+06.",
+            "--until = soon is not allowed; it must be a finite number at least 1e-09 and at most 1e+06.",
         ),
         (("--spacing", "40"), "--spacing = 40 leaves less than one material point for the flow of 45 m³/m; it must"),
         (("--jobs", "0"), "--jobs = 0 is not allowed; it must be a whole number at least 1 and at most 1024.\n"),

@@ -340,3 +340,24 @@ def test_a_file_that_may_not_be_read_is_not_called_missing(command, monkeypatch)
 def test_a_file_name_that_is_no_text_is_recorded(tmp_path, coarse_case_1, flying_points):
     run_scenario(coarse_case_1, tmp_path / "run", make_simulation=flying_points, origin="sc\udcffne.json")
     assert Results.open(tmp_path / "run").record["scenario_file"] == "sc\udcffne.json"
+
+
+def test_pictures_do_not_hang_on_the_window_system_that_is_set(tmp_path):
+    answer = run(tmp_path / "run", "--quiet", pictures=True, MPLBACKEND="nonsense")
+    assert (answer.returncode, answer.stderr) == (0, b"")
+    assert (tmp_path / "run" / run_folder.FORCE_PLOT).exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
+@pytest.mark.parametrize(
+    "command", ["warp_mpm scenarios case_1 --out copied", "analytic sweep plan scenarios/case_1.json copied --count 1"]
+)
+def test_what_a_full_disk_takes_in_part_is_not_left(tmp_path, command):
+    """A file may grow to 512 bytes: of a scene there would be a fifth."""
+    command = command.replace("scenarios/", f"{ROOT}/scenarios/")
+    words = f"ulimit -f 1; cd '{tmp_path}' && PYTHONPATH='{ROOT}' '{sys.executable}' -B -m {command}"
+    answer = subprocess.run(["sh", "-c", words], capture_output=True, text=True, timeout=60, check=False)
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert " cannot be written: File too large." in answer.stderr
+    assert answer.stderr.startswith("copied/")
+    assert list((tmp_path / "copied").iterdir()) == []

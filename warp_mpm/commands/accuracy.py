@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from analytic.command_line import complain, refusals
+from analytic.whole_file import write_whole
 from warp_mpm.commands.options import agreed, with_options
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def _check(scenario: Scenario, folder: Path, page: Path | None, jobs: int) -> No
         complain(f"Interrupted; what ended is in {folder}. The same command goes on from there.")
         raise typer.Exit(INTERRUPTED) from None
     text = table(checks)
-    (folder / "check.md").write_text(text, encoding="utf-8")
+    write_whole(folder / "check.md", text)
     typer.echo(text)
     if page is not None:
         put_into_page(page, folder.name, text, [])

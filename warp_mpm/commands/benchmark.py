@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from analytic.command_line import refusals
+from analytic.whole_file import write_whole
 
 if TYPE_CHECKING:
     from warp_mpm.performance.table import Table
@@ -120,9 +121,9 @@ def benchmark(
 
 def _write(out: Path, what: What, tables: list[Table], taken_on: dict[str, str]) -> None:
     content = {"machine": taken_on, "tables": [asdict(table) for table in tables]}
-    (out / f"{what}.json").write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    write_whole(out / f"{what}.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     shown = "\n".join(f"**{table.title}**\n\n{table.markdown()}" for table in tables)
-    (out / f"{what}.md").write_text(f"{_machine_line(taken_on)}\n\n{shown}")
+    write_whole(out / f"{what}.md", f"{_machine_line(taken_on)}\n\n{shown}")
 
 
 def _machine_line(taken_on: dict[str, str]) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from analytic.command_line import refusals
+from analytic.whole_file import whole_file
 
 
 def scenarios(
@@ -66,7 +67,7 @@ def _copy(files: dict[Path, Path], folder: Path, *, force: bool) -> tuple[int, i
 
     Raises:
         ValueError: another file of a name is there; nothing has been written then.
-        OSError: the folder cannot be written to.
+        OSError: the folder cannot be made, or a file not be written.
     """
     wanted = {folder / place: file.read_bytes() for place, file in files.items()}
     new = {target: text for target, text in wanted.items() if not target.exists() or target.read_bytes() != text}
@@ -75,5 +76,6 @@ def _copy(files: dict[Path, Path], folder: Path, *, force: bool) -> tuple[int, i
             raise ValueError(f"{target} is there already and differs; --force replaces it.")
     for target, text in new.items():
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(text)
+        with whole_file(target) as aside:
+            aside.write_bytes(text)
     return len(new), len(wanted) - len(new)

@@ -30,6 +30,10 @@ from .layout import (
 WORST = 0.6
 """Crowding beyond which more makes no difference: drops that land on each other must not be thrown apart."""
 
+SHRUNK = 0.9
+"""Share of the porosity at the start below which a point's own bounds the time step, by 5 % and more; what is less the
+Courant number has room for."""
+
 
 def make_constitutive(
     types: SimpleNamespace,
@@ -82,6 +86,7 @@ def make_constitutive(
     SMOOTHING = effects.volumetric_smoothing
     RELAXATION = effects.pressure_relaxation
     DENSITY = effects.density_correction
+    POROSITY = effects.porosity_update
     VISCOSITY = effects.bulk_viscosity
     MOVING = effects.moving
     PARTLY_DRY = "corner_wet" in types.grid_fields and LIQUID
@@ -348,9 +353,19 @@ def make_constitutive(
 
     @wp.func
     def limit(p: wp.int32, points: Points, parameters: Parameters, book: Book):
-        """What only few points come to: voids that are closed, a gap in the liquid as large as the room there is."""
+        """What only few points come to: voids that are closed, or have shrunk, a gap in the liquid as large as the room
+        there is."""
         grains = parameters.grain_share * read(points.reference_volume, p)
         volume = read(points.volume, p)
+        if POROSITY:
+            # The stiffness K_L n_S / n of what is left of the liquid's share carries the fast wave.
+            n = porosity(read(points.reference_volume, p), volume, parameters)
+            if n < F(wp.static(SHRUNK)) * parameters.porosity:
+                stiffer = parameters.porosity * (F(1.0) - n) / (n * (F(1.0) - parameters.porosity))
+                own = solid_of(read(points.velocity, p))
+                faster = wp.float64(wp.sqrt(stiffer) - F(1.0)) * parameters.wave_speed
+                total = wp.float64(wp.sqrt(wp.dot(own, own))) + faster
+                wp.atomic_max(book.clock, wp.static(SPEED_MAX), total * total)
         if volume < grains:
             # The stress of closed voids rises faster than the volume on which it acts falls: waves gain speed.
             v = solid_of(read(points.velocity, p))

@@ -93,7 +93,7 @@ offer_schemes()
 class Output(Model):
     """What is recorded, and when."""
 
-    end_time_s: Annotated[float, Field(gt=0.0, le=1e6)]
+    end_time_s: Annotated[float, Field(ge=1e-9, le=1e6)]
     """Simulated time at which the run ends."""
     time_series_interval_s: Interval = 0.005
     """Interval of the time series; forces are means over it."""
