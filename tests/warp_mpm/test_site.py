@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import warp_mpm.cli
 from warp_mpm import Results, Scenario, Simulation
 from warp_mpm.barrier_figures import barrier_figures
+from warp_mpm.caveats import scene_caveats
 from warp_mpm.discretization import material_points
 from warp_mpm.effect_rules import derive_effects
 from warp_mpm.extent import domain_extent
@@ -358,6 +359,26 @@ def test_a_slope_of_many_pieces_is_a_slope():
         found.append(simulation.points()["position"])
     assert np.abs(found[1] - found[0]).max() < 1e-2
     assert found[0][:, 0].max() > -3.0
+
+
+def test_a_ridge_that_no_grid_resolves_is_told():
+    """By its thickness two cells below its top; a step, a wide ridge and a needle-shaped valley are none."""
+
+    def said(*points, **changes):
+        profile = [[-40, 12], [-20, 6], *points, [40, -4]]
+        return [one for one in scene_caveats(site(ground={"profile_m": profile}, **changes)) if "ridge" in one]
+
+    needle = [[-3, 0.9], [-2.9, 4.0], [-2.8, 0.84], [0, 0]]
+    assert said(*needle) == [
+        "The ground's ridge at x = -2.9 m is 0.064 m thick 2 cells below its top; less than 0.5 cells do not part the "
+        "flow on its two sides, and energy may appear there. Take its top out of ground.profile_m."
+    ]
+    assert "-2.9 m and 1 more is" in said(*needle, [3, 0], [3.1, 3], [3.2, 0])[0]
+    assert len(said([-3, 0.9], [-3, 3], [-2.9, 3], [-2.9, 0.9], [0, 0])) == 1
+    assert said([-3, 0.9], [-2.5, 4.0], [-2, 0.6], [0, 0], numerics={"spacing_m": 0.1}) == []
+    assert said([-3, 0.9], [-2.5, 4.0], [-2, 0.6], [0, 0]) == []
+    assert said([-3, 0.9], [-2.9, -4.0], [-2.8, 0.84], [0, 0]) == []
+    assert said([-4, 1.2], [-4, 3], [0, 0]) == []
 
 
 def test_a_block_slides_down_a_profile_as_under_tilted_gravity():
