@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import warp_mpm.cli
 from warp_mpm import Results, Scenario, Simulation
 from warp_mpm.barrier_figures import barrier_figures
+from warp_mpm.caveats import scene_caveats
 from warp_mpm.discretization import material_points
 from warp_mpm.effect_rules import derive_effects
 from warp_mpm.extent import domain_extent
@@ -20,7 +21,7 @@ from warp_mpm.run import run_in_memory, run_scenario
 from warp_mpm.scenario.site import all_standing, standing_outline
 from warp_mpm.scenario_errors import ScenarioError
 from warp_mpm.shipped import SCENARIOS
-from warp_mpm.simulator.bodies import Outline
+from warp_mpm.simulator.bodies import Outline, arrays
 from warp_mpm.simulator.bodies.arrays import effects_of, pieces_by_column
 from warp_mpm.simulator.bodies.kernels import RUBBED
 from warp_mpm.simulator.bodies.outline import Segments
@@ -360,6 +361,26 @@ def test_a_slope_of_many_pieces_is_a_slope():
     assert found[0][:, 0].max() > -3.0
 
 
+def test_a_ridge_that_no_grid_resolves_is_told():
+    """By its thickness two cells below its top; a step, a wide ridge and a needle-shaped valley are none."""
+
+    def said(*points, **changes):
+        profile = [[-40, 12], [-20, 6], *points, [40, -4]]
+        return [one for one in scene_caveats(site(ground={"profile_m": profile}, **changes)) if "ridge" in one]
+
+    needle = [[-3, 0.9], [-2.9, 4.0], [-2.8, 0.84], [0, 0]]
+    assert said(*needle) == [
+        "The ground's ridge at x = -2.9 m is 0.064 m thick 2 cells below its top; less than 0.5 cells do not part the "
+        "flow on its two sides, and energy may appear there. Take its top out of ground.profile_m."
+    ]
+    assert "-2.9 m and 1 more is" in said(*needle, [3, 0], [3.1, 3], [3.2, 0])[0]
+    assert len(said([-3, 0.9], [-3, 3], [-2.9, 3], [-2.9, 0.9], [0, 0])) == 1
+    assert said([-3, 0.9], [-2.5, 4.0], [-2, 0.6], [0, 0], numerics={"spacing_m": 0.1}) == []
+    assert said([-3, 0.9], [-2.5, 4.0], [-2, 0.6], [0, 0]) == []
+    assert said([-3, 0.9], [-2.9, -4.0], [-2.8, 0.84], [0, 0]) == []
+    assert said([-4, 1.2], [-4, 3], [0, 0]) == []
+
+
 def test_a_block_slides_down_a_profile_as_under_tilted_gravity():
     angle = math.radians(20)
     box = [[-14, 0], [-6, 0], [-6, 2], [-14, 2]]
@@ -413,6 +434,46 @@ def test_a_site_of_four_times_the_size_is_the_same_in_twice_the_time():
     assert np.abs(far / 4.0 - near).max() < 1e-9
     assert force["impact_force_x"] > 1e4
     assert greater["impact_force_x"] == pytest.approx(16 * force["impact_force_x"], rel=1e-9)
+
+
+def test_places_that_are_passed_over_change_nothing(monkeypatch):
+    """The flow runs down the slope over dry ground and leaves it again: bit for bit as with no place left out, in runs
+    as they are and one by one."""
+    scene = site(barrier=DAM, flow=content()["flow"] | {"velocity_m_per_s": [9, -2.7]}, output={"end_time_s": 2.0})
+    found = []
+    for length in (arrays.RUN, 1, 10**6):
+        monkeypatch.setattr(arrays, "RUN", length)
+        simulation = Simulation(scene)
+        samples = []
+        for time in (1.0, 2.0):
+            simulation.advance(time)
+            samples.append(simulation.sample())
+        near, run, solid, position = (
+            simulation._contact_arrays[name].numpy() for name in ("near", "run", "solid", "position")
+        )
+        far = np.repeat(near == 0, np.diff(run))
+        far = np.append(np.zeros(run[0], dtype=bool), far)
+        # Where the flow lay at the start there is none, and nothing is remembered.
+        assert length > 8 or (far & (np.abs(position[:, 0] + 14.0) < 1.0)).any()
+        assert not solid[far].any()
+        found.append((samples, float(near.mean()), len(near)))
+    assert found[0][0] == found[1][0] == found[2][0]
+    (_, share, runs), (_, _, alone), (_, whole, colours) = found
+    assert share < 0.8 < whole
+    assert alone > runs > colours
+
+
+def test_a_state_is_gone_on_with_whatever_places_were_near():
+    """A simulation that has been elsewhere goes on from a state as the one that it is of."""
+    scene = site(barrier=DAM, flow=content()["flow"] | {"velocity_m_per_s": [9, -2.7]}, output={"end_time_s": 2.0})
+    first, other = Simulation(scene), Simulation(scene)
+    first.advance(0.6)
+    state = first.save_state()
+    first.advance(1.2)
+    other.advance(2.0)
+    other.restore_state(state)
+    other.advance(1.2)
+    assert other.sample() == first.sample()
 
 
 def test_a_mirrored_site_gives_the_mirror_image():

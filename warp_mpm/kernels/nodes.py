@@ -42,6 +42,9 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                 if grid.telling[bi, bj] == 1:
                     for b in range(wp.static(BLOCK)):
                         grid.told[i, bj * wp.static(BLOCK) + b] = M()
+            if PARTLY_DRY:  # for itself: of more arrays at a time the compiler makes no vector instructions
+                for b in range(wp.static(BLOCK)):
+                    grid.corner_wet[i, bj * wp.static(BLOCK) + b] = F(0.0)
             for b in range(wp.static(BLOCK)):
                 j = bj * wp.static(BLOCK) + b
                 if UNLIKE:
@@ -59,8 +62,6 @@ def make_nodes(types: SimpleNamespace, module: str) -> SimpleNamespace:
                     grid.drag_beyond[i, j] = F(0.0)
                 if CORNERS:
                     grid.corner[i, j] = S()
-                if PARTLY_DRY:
-                    grid.corner_wet[i, j] = F(0.0)
 
     @wp.kernel(module=module)
     def forget(grid: Grid):
