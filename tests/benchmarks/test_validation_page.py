@@ -92,7 +92,7 @@ def test_the_page_shows_numbers_reasons_and_plots(tmp_path, only_made_up):
     assert "| 1 | 2 |" in text
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
-    assert re.search(r"\[Made up\]\(#made-up\) \| \*\*short\*\* \(1 of 2\) \| 5 \|", text)
+    assert re.search(r"\[Made up\]\(#made-up\) \| \*\*short\*\* \(1 of 1\) \| 5 \|", text)
 
 
 def test_all_within_their_limits_is_exit_code_0(tmp_path, only_made_up):

@@ -11,7 +11,8 @@ from warp_mpm.scenario import Scenario
 from warp_mpm.simulation import Simulation
 from warp_mpm.validation.case import Array, Case, Check, Curve, Outcome, Panel, at_most, compared, reference, reported
 from warp_mpm.validation.contact import STIFF
-from warp_mpm.validation.rheology import DENSITY, GRAINS, MIXTURE, NO_SLIP, bagnold_profile
+from warp_mpm.validation.grains_on_a_slope import GRAINS, bagnold_profile
+from warp_mpm.validation.layers import DENSITY, MIXTURE, NO_SLIP
 from warp_mpm.validation.scenes import INVISCID, LIQUID_BULK_MODULUS, box, scene
 
 G = 9.81
