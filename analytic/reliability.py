@@ -33,6 +33,10 @@ INPUTS = {
 """Inputs that may be uncertain, SI, and the range in which each makes sense; distributions are cut off there."""
 
 
+LEAST_SPREAD = 1e-9
+"""From the first tenth to the last, over the number: with less, samples are told apart by rounding alone."""
+
+
 @dataclass(frozen=True)
 class Distribution:
     """An uncertain number: `normal(mean, deviation)`, `lognormal(mean, coefficient of variation)`,
@@ -120,7 +124,11 @@ def parse(name: str, text: str) -> float | Distribution:
         parameters = ()
     if len(parameters) != count or not all(map(math.isfinite, parameters)) or not _ordered(found[1], parameters):
         raise ValueError(f"{name} is {text!r}, it must read {form} with finite numbers in order and a spread above 0.")
-    return Distribution(found[1], parameters)
+    distribution = Distribution(found[1], parameters)
+    low, high = distribution.quantile(np.array([0.1, 0.9]))
+    if not high - low > LEAST_SPREAD * max(abs(low), abs(high)):
+        raise ValueError(f"{name} is {text!r}, it must be a number where its spread is nothing beside it.")
+    return distribution
 
 
 def _ordered(kind: str, parameters: tuple[float, ...]) -> bool:

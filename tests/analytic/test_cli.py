@@ -537,6 +537,7 @@ def test_design_says_how_far_off_it_may_be_and_what_does_better() -> None:
     assert "python -m warp_mpm design SCENARIO" in " ".join(notes)
 
 
+LOST = "--speed = 'normal(10, 1e-300)' is not allowed; it must be a number where its spread is nothing beside it."
 SIZE = "it must be nil or from 1e-12 to 1e+12 in size."
 
 
@@ -550,6 +551,7 @@ SIZE = "it must be nil or from 1e-12 to 1e+12 in size."
         ("predict", ["--reference-speed", "1e-308"], f"--reference-speed = 1e-308 is not allowed; {SIZE}"),
         ("design", ["--density", "1e300"], f"--density = 1e+300 is not allowed; {SIZE}"),
         ("design", ["--speed", "lognormal(1e200, 0.1)"], f"--speed = lognormal(1e+200, 0.1) is not allowed; {SIZE}"),
+        ("design", ["--speed", "normal(10, 1e-300)"], LOST),
         ("design", ["--seed", "-1"], "--seed = -1 is not allowed; it must be a whole number at least 0."),
     ],
 )
