@@ -241,7 +241,7 @@ def runs_of(
     blocks where its body moves relative to the grid."""
     begins = [np.arange(begin, end, length) for begin, end in pairwise(colour)]
     first = np.concatenate([np.zeros(0, dtype=np.int64), *begins])
-    ends = np.append(first[1:], colour[-1])
+    ends = np.append(first, colour[-1])[1:]
     blocks = np.array([grid.columns, grid.rows]) // BLOCK
     around = np.tile(np.array([0, blocks[0] - 1, 0, blocks[1] - 1], dtype=np.int32), (len(first), 1))
     cell = np.floor((places.position[:, :2] - (grid.left, grid.bottom)) / grid.spacing).astype(np.int64)
