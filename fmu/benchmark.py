@@ -140,9 +140,21 @@ def _noting_processor_time(timed: Timed, into: list[float]) -> Timed:
 
 def processor_time() -> float:
     """What this process has computed so far [s] and, where Linux tells, those that it began and that still live."""
-    children = map(int, CHILDREN.read_text().split()) if CHILDREN.exists() else ()
-    # The clock of another process is told by its number: clock_getcpuclockid(3), which Python lacks.
-    return time.process_time() + sum(time.clock_gettime(~child << 3 | 2) for child in children)
+    return time.process_time() + sum(map(clock_of, children()))
+
+
+def children() -> list[int]:
+    """Numbers of the processes that this one began and that still live."""
+    return [int(child) for child in CHILDREN.read_text().split()] if CHILDREN.exists() else []
+
+
+def clock_of(process: int) -> float:
+    """What another process has computed so far [s]; nil of one that has ended meanwhile."""
+    try:
+        # Its clock is told by its number: clock_getcpuclockid(3), which Python lacks.
+        return time.clock_gettime(~process << 3 | 2)
+    except OSError:
+        return 0.0
 
 
 def _step_plain(simulation: Simulation) -> float:
