@@ -33,6 +33,9 @@ INPUTS = {
 """Inputs that may be uncertain, SI, and the range in which each makes sense; distributions are cut off there."""
 
 
+LARGEST_SQUARED = 1e100
+"""Far below what a square of would be no number, far above 1."""
+
 LEAST_SPREAD = 1e-9
 """From the first tenth to the last, over the number: with less, samples are told apart by rounding alone."""
 
@@ -91,7 +94,7 @@ class Distribution:
 
     def _log_moments(self) -> tuple[float, float]:
         mean, variation = self.parameters
-        variance = math.log1p(variation**2)
+        variance = math.log1p(variation**2) if variation < LARGEST_SQUARED else 2 * math.log(variation)
         return math.log(mean) - variance / 2, math.sqrt(variance)
 
 
@@ -125,8 +128,10 @@ def parse(name: str, text: str) -> float | Distribution:
     if len(parameters) != count or not all(map(math.isfinite, parameters)) or not _ordered(found[1], parameters):
         raise ValueError(f"{name} is {text!r}, it must read {form} with finite numbers in order and a spread above 0.")
     distribution = Distribution(found[1], parameters)
-    low, high = distribution.quantile(np.array([0.1, 0.9]))
-    if not high - low > LEAST_SPREAD * max(abs(low), abs(high)):
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers beyond all sizes have no spread that is a number
+        low, high = distribution.quantile(np.array([0.1, 0.9]))
+        swallowed = math.isfinite(high) and high - low <= LEAST_SPREAD * max(abs(low), abs(high))
+    if swallowed:
         raise ValueError(f"{name} is {text!r}, it must be a number where its spread is nothing beside it.")
     return distribution
 

@@ -464,9 +464,9 @@ def _told(scenario: Scenario, one: _Judged) -> dict[str, float]:
         shape = one.barrier.shape
         if isinstance(shape, Trapezoid) and flow.speed > 0.0 and math.cos(tilt) > 0.0:
             crest, cosine, slope = shape.base_crest_height[2], math.cos(tilt), math.tan(tilt)
-            square = flow.speed**2
-            root = math.sqrt(slope**2 + 2.0 * g * crest / (square * cosine))
-            found["landing_distance"] = square / (g * cosine) * (slope + root) + crest * slope
+            # The formula with a speed drawn into the root, so that none is too small to be divided by.
+            root = math.sqrt((flow.speed * slope) ** 2 + 2.0 * g * crest / cosine)
+            found["landing_distance"] = flow.speed / (g * cosine) * (flow.speed * slope + root) + crest * slope
     if scenario.design is not None and scenario.design.boulder is not None:
         found["boulder_force"] = boulder_force(scenario, scenario.design)
     return found

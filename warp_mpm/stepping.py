@@ -130,9 +130,11 @@ class Stepping:
         way = inflow.way(until) + 1e-6 * held.grid.spacing if inflow is not None else 0.0
         share = max(1, -(-sum(map(len, self.entry)) // GROWTHS))
         before = self._in_flow or [(0, 0, 0)] * len(held.spans)
+        # From a state put back, with as many threads as a run that came to it: rounding depends on how many there are.
+        threads_before = self._threads if self._in_flow else [0] * len(held.spans)
         state = held.points["inside"].numpy() if inflow is not None else None
         ends, arriving, threads = [], [], []
-        for (part, _), entry, (_, begin, _), so_far in zip(held.spans, self.entry, before, self._threads, strict=True):
+        for (part, _), entry, (_, begin, _), so_far in zip(held.spans, self.entry, before, threads_before, strict=True):
             there = part.end - part.begin - len(entry)
             come = int(np.searchsorted(entry, way, side="right"))
             threads.append(max(so_far, there + min(len(entry), -(-come // share) * share)))

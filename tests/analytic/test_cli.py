@@ -552,6 +552,12 @@ SIZE = "it must be nil or from 1e-12 to 1e+12 in size."
         ("design", ["--density", "1e300"], f"--density = 1e+300 is not allowed; {SIZE}"),
         ("design", ["--speed", "lognormal(1e200, 0.1)"], f"--speed = lognormal(1e+200, 0.1) is not allowed; {SIZE}"),
         ("design", ["--speed", "normal(10, 1e-300)"], LOST),
+        ("design", ["--speed", "lognormal(10, 1e300)"], f"--speed = lognormal(10, 1e+300) is not allowed; {SIZE}"),
+        (
+            "design",
+            ["--speed", "normal(1e308, 1e308)"],
+            f"--speed = normal(1e+308, 1e+308) is not allowed; {SIZE}",
+        ),
         ("design", ["--seed", "-1"], "--seed = -1 is not allowed; it must be a whole number at least 0."),
     ],
 )

@@ -201,6 +201,12 @@ def test_a_wall_without_end_that_slides(load_scene):
     assert "only its sliding is judged" in rows["  remark"]
 
 
+def test_a_speed_whose_square_is_nothing_is_judged(load_scene):
+    slow = block(load_scene).replaced({"flow.velocity_m_per_s": [1e-200, 0.0]})
+    told = {entry["name"]: entry["value"] for entry in verdict(slow, constant(), FIGURES)["told"]}
+    assert 0.0 < told["landing_distance"] < 1e-199
+
+
 def of_second(series):
     """The same loads on the second barrier."""
     names = {"impact_force_x": "face_force_x", "impact_force_y": "face_force_y", "top_force": "top_force_x",

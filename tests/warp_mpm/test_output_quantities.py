@@ -145,7 +145,8 @@ def test_nothing_but_time(flying_points, load_scene, tmp_path):
 
 
 def test_names_that_are_none(load_scene):
-    with pytest.raises(ScenarioError, match=r'output.quantities: "force" is not recorded; each must be one of time'):
+    said = r'output.quantities: "force" cannot be chosen; each must be one of time.*barriers are recorded always'
+    with pytest.raises(ScenarioError, match=said):
         load_scene("case_1", **{"output.quantities": ["force"]})
     with pytest.raises(ScenarioError, match="is there twice"):
         load_scene("case_1", **{"output.quantities": ["top_force", "top_force"]})

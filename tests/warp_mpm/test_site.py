@@ -17,6 +17,8 @@ from warp_mpm.effect_rules import derive_effects
 from warp_mpm.extent import domain_extent
 from warp_mpm.grid import fit_grid
 from warp_mpm.kernels import layout as at
+from warp_mpm.plotting import comparison, force_and_displacement
+from warp_mpm.report.content import run_content
 from warp_mpm.run import run_in_memory, run_scenario
 from warp_mpm.scenario.site import all_standing, standing_outline
 from warp_mpm.scenario_errors import ScenarioError
@@ -586,6 +588,26 @@ def test_a_pool_loads_the_second_barrier_as_theory_says():
     face = run.loads.surfaces["second_face"]
     assert (face.height[0], face.height[-1], face.place[0]) == pytest.approx((0.0, 3.0, 0.0))
     assert face.pressures["normal"][-1] @ np.diff(face.edges) == pytest.approx(series["second_face_force_x"][-1])
+
+
+def test_further_barriers_are_drawn_together(two):
+    """A panel of each column would fill pages: there are twenty of each barrier."""
+    panels = [panel.get_ylabel() for panel in force_and_displacement(two).axes]
+    assert [words for words in panels if "further" in words] == [
+        "force on\nfurther barriers [kN/m]", "displacement of\nfurther barriers [m]"
+    ]  # fmt: skip
+    assert not any("second" in words for words in panels)
+    words = [" ".join(panel.get_ylabel().split()) for panel in comparison([two, two]).axes]
+    assert [label for label in words if "second" in label] == [
+        "force on second along x [kN/m]", "displacement of second [m]"
+    ]  # fmt: skip
+    charts = {chart["title"]: chart for chart in run_content(two, "two")["charts"]}
+    assert [line["label"] for line in charts["second: overturning moment"]["lines"]] == [
+        f"moment on second about its {end}, {how}" for end in ("toe", "heel") for how in ("raw", "mean over 0.05 s")
+    ]  # fmt: skip
+    drawn = [line["label"] for chart in charts.values() for line in chart["lines"]]
+    assert {"displacement of second", "work done on second", "run-up on second"} < set(drawn)
+    assert sum("second" in title for title in charts) < 12
 
 
 def test_what_a_barrier_has_left_behind_has_not_landed_beyond_it(two):

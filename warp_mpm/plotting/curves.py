@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from analytic.force_record import FILTER_WINDOW, moving_mean
 from warp_mpm.plotting.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RUN_COLOURS, grid, heading, named, symbol
 from warp_mpm.quantities import Quantity, Sampled
-from warp_mpm.quantities.time_series import NAMED
+from warp_mpm.quantities.time_series import NAMED, columns_of_further, further_quantities
 from warp_mpm.results import Results, ResultsError
 from warp_mpm.scenario import Fixed
 
@@ -35,8 +35,8 @@ def force_and_displacement(results: Results) -> Figure:
     time = series["time"]
     moves = not isinstance(scenario.barrier.motion, Fixed) and "barrier_displacement" in series
     energies = "flow_kinetic_energy" in series
-    own = own_quantities([results])
-    rows = 1 + moves + energies + len(own)
+    further, own = of_further_barriers([results]), own_quantities([results])
+    rows = 1 + moves + energies + len(further) + len(own)
     figure = Figure(figsize=(7.5, 2.5 + 2.0 * rows), layout="constrained")
     axes = figure.subplots(rows, 1, sharex=True, height_ratios=[2.0] + [1.0] * (rows - 1), squeeze=False).ravel()
     heading(figure, scenario.title)
@@ -94,7 +94,14 @@ def force_and_displacement(results: Results) -> Figure:
         energy.set_ylabel(f"kinetic\nenergy [{unit.shown_unit}]")
         energy.legend(fontsize=9)
         energy.set_ylim(bottom=0.0)
-    for panel, quantity in zip(axes[1 + moves + energies :], own, strict=True):
+    more = axes[1 + moves + energies :]
+    for panel, (words, columns) in zip(more, further.items(), strict=False):
+        for number, (name, quantity) in enumerate(columns.items()):
+            colour = RUN_COLOURS[number % len(RUN_COLOURS)]
+            panel.plot(time, _curve(series, quantity), color=colour, label=name)
+            panel.set_ylabel(f"{words} [{quantity.shown_unit}]")
+        panel.legend(fontsize=9)
+    for panel, quantity in zip(more[len(further) :], own, strict=True):
         panel.plot(time, _curve(series, quantity), color=BLUE)
         panel.set_ylabel(_axis(quantity))
     axes[-1].set_xlabel("time [s]")
@@ -129,7 +136,11 @@ def comparison(runs: Sequence[Results]) -> Figure:
         raise ResultsError(_no_force(runs[0]))
     shown = [
         quantity
-        for quantity in (*(NAMED[name] for name in COMPARED), *own_quantities(runs))
+        for quantity in (
+            *(NAMED[name] for name in COMPARED),
+            *(quantity for columns in of_further_barriers(runs).values() for quantity in columns.values()),
+            *own_quantities(runs),
+        )
         if quantity.name in ALWAYS_COMPARED or any(np.any(columns.get(quantity.name, 0.0)) for columns in series)
     ]
     rows = math.ceil(len(shown) / 2)
@@ -161,9 +172,29 @@ def comparison(runs: Sequence[Results]) -> Figure:
     return figure
 
 
+FURTHER = {"force_x": "force on\nfurther barriers", "barrier_displacement": "displacement of\nfurther barriers"}
+"""Panels of all further barriers, by the end of the columns drawn; the rest that is told of each would fill pages."""
+
+
+def of_further_barriers(runs: Sequence[Results]) -> dict[str, dict[str, Quantity]]:
+    """Columns that are drawn of the further barriers of any of the runs, by panel and name of the barrier."""
+    found: dict[str, dict[str, Quantity]] = {}
+    for results in runs:
+        known = further_quantities(results.scenario)
+        for one in results.scenario.barriers:
+            for end, words in FURTHER.items():
+                column = f"{one.name}_{end}"
+                if column in known and column in results.time_series:
+                    found.setdefault(words, {})[one.name] = known[column]
+    return found
+
+
 def own_quantities(runs: Sequence[Results]) -> list[Quantity]:
     """What scripts recorded in any of the runs, beside the columns of the package."""
-    found = {name: one for results in runs for name, one in results.quantities.items() if name not in NAMED}
+    found: dict[str, Quantity] = {}
+    for results in runs:
+        known = {*NAMED, *(column for one in results.scenario.barriers for column in columns_of_further(one.name))}
+        found |= {name: one for name, one in results.quantities.items() if name not in known}
     return list(found.values())
 
 

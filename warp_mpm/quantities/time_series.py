@@ -213,6 +213,12 @@ OF_BARRIER: Mapping[str, str] = {
 """Columns of the first barrier, and how those of a further one end that tell the same."""
 
 
+def columns_of_further(name: str) -> set[str]:
+    """All columns that a time series can have of the further barrier `name`."""
+    ends = {*FURTHER, *OF_BARRIER.values(), "force_x", "force_y"}
+    return {f"{name}_{end}" for end in ends}
+
+
 def series_of_barrier(series: Mapping[str, Any], name: str) -> dict[str, Any]:
     """What a time series tells of one of a scene's barriers, by the names of the columns of the first one."""
     if name == "barrier":

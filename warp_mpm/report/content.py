@@ -17,7 +17,7 @@ from warp_mpm.description import described
 from warp_mpm.effect_rules import effect_rules
 from warp_mpm.quantities import Quantity, Sampled
 from warp_mpm.quantities.figures import FIGURES
-from warp_mpm.quantities.time_series import NAMED
+from warp_mpm.quantities.time_series import NAMED, OF_BARRIER, columns_of_further
 from warp_mpm.results import Results
 from warp_mpm.scenario import Scenario
 from warp_mpm.scenario.site import all_standing
@@ -203,8 +203,20 @@ def _fit_row(fit: Calibration, series: Mapping[str, Array]) -> dict[str, str]:
 
 
 def own_charts(results: Results) -> dict[str, tuple[str, ...]]:
-    """Charts of what a script records, beside those of the package."""
-    return {one.words: (name,) for name, one in results.quantities.items() if name not in NAMED}
+    """Charts of each further barrier, as of the first, and of what a script records, beside those of the package."""
+    charts: dict[str, tuple[str, ...]] = {}
+    known = set(NAMED)
+    for one in results.scenario.barriers:
+        known |= columns_of_further(one.name)
+        charts[f"{one.name}: force on the whole barrier"] = (f"{one.name}_force_x", f"{one.name}_force_y")
+        charts[f"{one.name}: work done on the barrier"] = (f"{one.name}_barrier_work",)
+        charts[f"{one.name}: run-up on the face"] = (f"{one.name}_face_run_up",)
+        for title, names in CHARTS.items():
+            if names[0] in OF_BARRIER:
+                charts[f"{one.name}: {title}"] = tuple(
+                    f"{one.name}_{OF_BARRIER[name]}" for name in names if name in OF_BARRIER
+                )
+    return charts | {one.words: (name,) for name, one in results.quantities.items() if name not in known}
 
 
 def _chart(results: Results, title: str, names: tuple[str, ...], fits: list[Calibration]) -> dict[str, Any] | None:

@@ -118,7 +118,10 @@ class Output(Model):
             known = list(NAMED)
             for name in names:
                 if name not in known:
-                    raise ValueError(f"{json.dumps(name)[:80]} is not recorded; each must be one of {', '.join(known)}")
+                    raise ValueError(
+                        f"{json.dumps(name)[:80]} cannot be chosen; each must be one of {', '.join(known)} (columns of "
+                        "further barriers are recorded always)"
+                    )
                 if names.count(name) > 1:
                     raise ValueError(f"{json.dumps(name)} is there twice; each must be there once")
         return names
