@@ -110,24 +110,20 @@ def make_contact(
         return first + (k / 9) * layer_of(parameters) + (k / 3) % 3 * parameters.rows + k % 3
 
     @wp.func
-    def told_around(grid: Grid, first: wp.int32, parameters: Parameters) -> wp.int32:
-        """1 where points of other materials than the flow's have told something to a block of the place's nodes."""
-        result = wp.int32(0)
-        if MATERIALS:
-            i = first / parameters.rows
-            j = first - i * parameters.rows
-            left = (i >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-            right = ((i + 2) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-            low = j >> wp.static(BLOCK_SHIFT)
-            high = (j + 2) >> wp.static(BLOCK_SHIFT)
-            if (
-                read(grid.telling, left + low) != 0
-                or read(grid.telling, right + low) != 0
-                or read(grid.telling, left + high) != 0
-                or read(grid.telling, right + high) != 0
-            ):
-                result = wp.int32(1)
-        return result
+    def noted(blocks: wp.array2d(dtype=wp.int32), first: wp.int32, parameters: Parameters) -> wp.bool:
+        """Whether any of the blocks that hold a place's nodes is marked."""
+        i = first / parameters.rows
+        j = first - i * parameters.rows
+        left = (i >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        right = ((i + 2) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
+        low = j >> wp.static(BLOCK_SHIFT)
+        high = (j + 2) >> wp.static(BLOCK_SHIFT)
+        return (
+            read(blocks, left + low) != 0
+            or read(blocks, right + low) != 0
+            or read(blocks, left + high) != 0
+            or read(blocks, right + high) != 0
+        )
 
     @wp.func
     def inverse_mass(contact: Contact, e: wp.int32, grid: Grid, parameters: Parameters) -> F:
@@ -156,9 +152,10 @@ def make_contact(
             of_liquid_twice = F(0.0)
             drag = F(0.0)
             filling = F(0.0)
-            mixed = told_around(grid, first, parameters)
-            write(contact.mixed, e, mixed)
-            if mixed != 0:
+            # Points of other materials than the flow's have told the nodes something.
+            mixed = noted(grid.telling, first, parameters)
+            write(contact.mixed, e, wp.where(mixed, 1, 0))
+            if mixed:
                 per_mass = contact.per_mass[e]
                 for k in range(AROUND):
                     if per_mass[k] > F(0.0):
@@ -543,21 +540,6 @@ def make_contact(
         react(bodies, body, push)
 
     @wp.func
-    def in_use(grid: Grid, i: wp.int32, j: wp.int32, parameters: Parameters) -> wp.bool:
-        """Whether any of the blocks that hold the nodes around one holds material: most places of a long outline are
-        dry, and need not look at their nodes."""
-        left = ((i - 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-        right = ((i + 1) >> wp.static(BLOCK_SHIFT)) * parameters.block_rows
-        low = (j - 1) >> wp.static(BLOCK_SHIFT)
-        high = (j + 1) >> wp.static(BLOCK_SHIFT)
-        return (
-            read(grid.block, left + low) != 0
-            or read(grid.block, right + low) != 0
-            or read(grid.block, left + high) != 0
-            or read(grid.block, right + high) != 0
-        )
-
-    @wp.func
     def flow_around(contact: Contact, r: wp.int32, grid: Grid, parameters: Parameters) -> wp.int32:
         """1 where any of the blocks around a run of places holds material."""
         around = contact.around[r]
@@ -580,7 +562,8 @@ def make_contact(
                 write(contact.first, e, (i - 1) * parameters.rows + j - 1)
                 contact.weight_x[e] = weights(fx)
                 contact.weight_y[e] = weights(fy)
-                wet = in_use(grid, i, j, parameters)
+                # Most places of a long outline are dry, and need not look at their nodes.
+                wet = noted(grid.block, read(contact.first, e), parameters)
         inverse = F(0.0)
         if read(contact.first, e) >= 0 and wet:
             inverse = inverse_mass(contact, e, grid, parameters)
