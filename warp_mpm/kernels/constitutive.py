@@ -5,10 +5,11 @@ from typing import Any
 
 import warp as wp
 
-from ..simulator.bodies.kernels import DEEP
+from ..simulator.bodies.kernels import BESIDE, CUT, DEEP
 from .arrival import make_arrival
 from .elementary import make_elementary
 from .layout import (
+    BESIDE_CUT,
     DIVERGED,
     FLOW_END,
     FLOW_STEP,
@@ -23,6 +24,7 @@ from .layout import (
     POINTS_LEFT,
     POINTS_PUSHED,
     SPEED_MAX,
+    SURROUNDED,
     TIME_STEP,
     VOIDS_CLOSED,
 )
@@ -81,6 +83,7 @@ def make_constitutive(
     set_back = bodies_of.set_back if BODIES else None
     in_box = bodies_of.in_box if BODIES else None
     about = bodies_of.about if BODIES else None
+    near_some = bodies_of.near_some if BODIES else None
     RESTING = not effects.passing
     CORNERS = effects.smoothing_grid
     SMOOTHING = effects.volumetric_smoothing
@@ -193,7 +196,17 @@ def make_constitutive(
                 # With the part that was left out of the average.
                 smooth[2] += parameters.true_liquid_density * wp.dot(parameters.gravity, x)
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
-                write(points.surrounded, p, wp.where(least_filling > F(0.6), wp.int32(1), wp.int32(0)))
+                surrounded = wp.where(least_filling > F(0.6), wp.int32(wp.static(SURROUNDED)), wp.int32(0))
+                if BODIES and surrounded != 0:
+                    beside = wp.bool(False)
+                    if RESTING:
+                        beside = (read(grid.solid, ci * parameters.rows + cj) & wp.static(CUT)) != 0
+                    else:
+                        reach = F(wp.static(BESIDE)) * parameters.spacing
+                        beside = near_some(bodies, bodies.cuts, section(x), ci, parameters.columns, reach)
+                    if beside:
+                        surrounded = wp.int32(wp.static(BESIDE_CUT))
+                write(points.surrounded, p, surrounded)
             write(points.smooth, p, smooth)
 
         before = x
@@ -338,10 +351,12 @@ def make_constitutive(
                 # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
                 # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
                 share = smaller(parameters.relaxation_rate * time_step, F(1.0))
-                correction = share * (read(points.pressure_residual, p) - smooth[3]) / parameters.liquid_bulk_modulus
+                surrounded = read(points.surrounded, p)
+                own = wp.where(surrounded == wp.static(SURROUNDED), read(points.pressure_residual, p), F(0.0))
+                correction = share * (own - smooth[3]) / parameters.liquid_bulk_modulus
                 write(points.pressure_residual, p, pressure_at(read(points.liquid_strain, p), parameters) - smooth[2])
                 filtered = wp.where(strain < F(0.0), smaller(strain + correction, F(0.0)), strain)
-                strain = wp.where(read(points.surrounded, p) == 1, filtered, strain)
+                strain = wp.where(surrounded != 0, filtered, strain)
             write(points.liquid_strain, p, strain)
         if AT_ONCE:
             settle(points, p, stress, gradient, volume, gap, time_step, parameters)

@@ -60,6 +60,11 @@ LIMITERS_SIZE = 2
 FASTEST = 1.0e5
 """Speed [m/s] beyond which a run has diverged, whatever the scene."""
 
+SURROUNDED, BESIDE_CUT = 1, 2
+"""`surrounded` of a point whose corners are all filled: the filter draws its pressure toward the average; or the point
+lies beside an outline that cuts cells, and takes only what the filter takes from those around it, so that no liquid is
+lost. Of any other: 0."""
+
 # Where a material point is, an entry of the points' `inside`.
 WAITING = -1
 """It has yet to arrive."""
@@ -231,7 +236,7 @@ def layout(effects: Effects) -> SimpleNamespace:
         points["crowding"] = array(dtype=scalar)  # volume over room, less 1: a mean over the last unit of shear strain
     if effects.pressure_relaxation:
         points["pressure_residual"] = array(dtype=scalar)
-        points["surrounded"] = array(dtype=wp.int32)  # 1: the corners around are filled, so that the filter acts
+        points["surrounded"] = array(dtype=wp.int32)  # whether the filter acts: SURROUNDED, BESIDE_CUT or 0
     if effects.bulk_viscosity:
         points["viscous_pressure"] = array(dtype=scalar)
     if effects.two_phase and not effects.volumetric_smoothing:

@@ -13,6 +13,7 @@ from .layout import (
     FLOW_END,
     FLOW_STEP,
     SPEED_MAX,
+    SURROUNDED,
     TIME_STEP,
 )
 
@@ -68,11 +69,7 @@ def make_transfer(
     EXTRA_STRESS = effects.skeleton.extra_stress
     LIQUID_ALONE = effects.liquid_alone
     ALONE_OF_MIXTURE = LIQUID_ALONE and not TWO_PHASE
-    in_hull = bodies_of.in_hull if ALONE_OF_MIXTURE else None
-    about = bodies_of.about if ALONE_OF_MIXTURE else None
-    nearest = bodies_of.nearest if ALONE_OF_MIXTURE else None
-    PROFILE = effects.profile
-    MOVING = effects.moving
+    near_some = bodies_of.near_some if ALONE_OF_MIXTURE else None
     RESTING = not effects.passing
     Bodies = types.Bodies
     Book = types.Book
@@ -287,21 +284,8 @@ def make_transfer(
             if RESTING:
                 rubbed = (read(grid.solid, ci * parameters.rows + cj) & wp.static(RUBS)) != 0
             else:
-                for body in range(bodies.count):
-                    if read(bodies.rubs, body) == 1:
-                        seen = section(x)
-                        if MOVING:
-                            moved = bodies.displacement[body]
-                            seen -= V2(F(moved[0]), F(moved[1]))
-                        reach = F(wp.static(RUBBED)) * parameters.spacing
-                        first_piece, last_piece = about(bodies, body, ci, parameters.columns)
-                        if PROFILE:
-                            # In a valley no piece alone tells that a place is far away.
-                            distance, _direction, _piece = nearest(bodies.pieces, first_piece, last_piece, seen)
-                            if distance < reach:
-                                rubbed = wp.bool(True)
-                        elif in_hull(bodies.pieces, bodies.hull, first_piece, last_piece, seen, reach):
-                            rubbed = wp.bool(True)
+                reach = F(wp.static(RUBBED)) * parameters.spacing
+                rubbed = near_some(bodies, bodies.rubs, section(x), ci, parameters.columns, reach)
             if rubbed:
                 # Of liquid that fills the whole volume, times the mixture's mass over its own.
                 alone = pressure * volume * parameters.inverse_spacing * time_step
@@ -427,7 +411,7 @@ def make_transfer(
             excess = F(0.0)
             residual = F(0.0)
             if RELAXATION:
-                if read(points.surrounded, p) == 1:
+                if read(points.surrounded, p) == wp.static(SURROUNDED):
                     residual = read(points.pressure_residual, p)
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
                 excess = pressure_at(read(points.liquid_strain, p), parameters)

@@ -20,7 +20,7 @@ from .body import Body, Driven, Sliding
 from .kernels import NEAR
 from .loads import Slots, feet, shares
 from .outline import ENDLESS, FEW, Segments
-from .places import Places, by_block, coloured, neighbours, places_of, sharing
+from .places import Places, along_grid, by_block, coloured, neighbours, places_of, sharing
 
 
 @dataclass(frozen=True)
@@ -137,6 +137,9 @@ def body_arrays(
     if effects.friction:
         given["friction"] = np.array([surface.friction for body in bodies for surface in body.surfaces])
         given["rubs"] = np.array([body.rubs for body in bodies], dtype=np.int32)
+    if "cuts" in types.body_fields:
+        cuts = [passes(body, bodies) or not along_grid(body.outline.segments, grid).all() for body in bodies]
+        given["cuts"] = np.array([cut and not body.edge for cut, body in zip(cuts, bodies, strict=True)], np.int32)
     if effects.turbulence:
         given["turbulence"] = np.array([surface.turbulence for body in bodies for surface in body.surfaces])
     if effects.moving:

@@ -9,12 +9,17 @@ from warp_mpm.effects import Effects
 
 from .outline import TIE
 
-DEEP, RUBS = 1, 2
+DEEP, RUBS, CUT = 1, 2, 4
 """Bits of the grid's `solid`: a point in the cell may be half a cell deep in a body, or within `RUBBED` cells of one
-that rubs."""
+that rubs; the cell lies within `BESIDE` cells of an outline that cuts cells."""
 
 RUBBED = 3.0
 """Cells from a surface within which points may share a node with it."""
+
+BESIDE = 1.5
+"""Cells from an outline that cuts cells within which pore pressures are not averaged: those that it cuts and the ones
+next to them, whose corners they share. Where a cell is cut its points need pressures that differ, or they would not
+push on the nodes as the surface does; an average takes them away, and the skeleton bears what it takes."""
 
 NEAR = 5.0
 """Cells from a point's column within which it looks at the pieces of a profile: more than `RUBBED` and the cells that a
@@ -47,6 +52,8 @@ def body_fields(effects: Effects, scalar: Any, V2: Any, V4: Any, P: Any) -> dict
     if effects.friction:
         fields["friction"] = array(dtype=scalar)  # [S]
         fields["rubs"] = array(dtype=wp.int32)  # [B] 1: some surface of the body has friction
+    if effects.pressure_relaxation and effects.passing:
+        fields["cuts"] = array(dtype=wp.int32)  # [B] 1: its outline cuts cells
     if effects.turbulence:
         fields["turbulence"] = array(dtype=scalar)  # [S] shear stress over the square of the slip [kg/m3]
     if effects.moving:
@@ -166,6 +173,7 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
 
     pieces_of = wp.array(dtype=P)
     numbers = wp.array(dtype=F)
+    marks = wp.array(dtype=wp.int32)
 
     @wp.func
     def normal_of(piece: P) -> V2:
@@ -264,6 +272,23 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
         return first, last
 
     @wp.func
+    def near_some(bodies: Bodies, which: marks, place: V2, column: wp.int32, columns: wp.int32, reach: F) -> wp.bool:
+        """Whether `place` lies within `reach` [m] of any of the bodies that are marked, of whose outlines it is the
+        hull that counts, but of a profile."""
+        for body in range(bodies.count):
+            if read(which, body) == 1:
+                seen = place - displaced(bodies, body)
+                first, last = about(bodies, body, column, columns)
+                if PROFILE:
+                    # In a valley no piece alone tells that a place is far away.
+                    distance, _direction, _piece = nearest(bodies.pieces, first, last, seen)
+                    if distance < reach:
+                        return True
+                elif in_hull(bodies.pieces, bodies.hull, first, last, seen, reach):
+                    return True
+        return False
+
+    @wp.func
     def set_back(pieces: pieces_of, first: wp.int32, last: wp.int32, seen: V2, depth: F) -> V2:
         """How a point is moved [m] that may lie `-depth` [m] deep in a body at most and is `seen` from it."""
         distance, direction, _piece = nearest(pieces, first, last, seen)
@@ -279,4 +304,5 @@ def make_body_functions(types: SimpleNamespace, elementary: SimpleNamespace) -> 
         in_hull=in_hull,
         look_ahead=look_ahead,
         set_back=set_back,
+        near_some=near_some,
     )

@@ -93,7 +93,7 @@ def places_of(bodies: Sequence[Body], grid: GridLayout, passing: Sequence[bool])
     for number, body in enumerate(bodies):
         on_grid = np.zeros(len(body.outline.segments), dtype=bool)
         if not passing[number]:
-            on_grid = _along_grid(body.outline.segments, grid)
+            on_grid = along_grid(body.outline.segments, grid)
             if on_grid.any():
                 found.append(_pairs(body, number, grid, on_grid))
         others = [b for k, b in enumerate(bodies) if k != number and not passing[number] and not passing[k]]
@@ -186,7 +186,7 @@ def sharing(places: Places, bodies: Sequence[Body], grid: GridLayout, passing: S
     return shared | whole[places.body] | free
 
 
-def _along_grid(pieces: Segments, grid: GridLayout) -> NDArray[np.bool_]:
+def along_grid(pieces: Segments, grid: GridLayout) -> NDArray[np.bool_]:
     """Pieces [G] that lie along a line of cell corners."""
     straight = np.abs(np.abs(pieces.normal).sum(axis=1) - 1.0) < 1e-12
     origin = np.abs(pieces.normal) @ np.array([grid.left, grid.bottom])

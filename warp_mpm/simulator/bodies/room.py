@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from warp_mpm.grid import GridLayout
 
 from .body import Body
-from .kernels import DEEP, RUBBED, RUBS
+from .kernels import BESIDE, CUT, DEEP, RUBBED, RUBS
 from .outline import Segments
+from .places import along_grid
 from .side import Side
 
 
@@ -34,7 +35,7 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
         if len(solid) == 1 and solid.normal[0, 1] == 1.0:
             share *= np.clip((y - solid.offset[0]) / spacing + 0.5, 0.0, 1.0)[None, :]
             continue
-        low = _distance(solid, x, y, window, spacing)
+        low, _ = _nearest(solid, x, y, window, spacing)
         share[low < -spacing] = 0.0
         near |= np.abs(low) <= spacing
     corner = np.argwhere(near)
@@ -58,8 +59,8 @@ def open_corner_volumes(bodies: Sequence[Body], grid: GridLayout, depth_in_cells
 
 def solid_cells(bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.int32]:
     """What a point in the cell around a node [columns, rows] may be near, in the bits of `kernels.DEEP` and
-    `kernels.RUBS`, of bodies that lie still as seen from the grid; an edge of the domain is smooth and sets no point
-    back."""
+    `kernels.RUBS`, and whether the cell lies beside an outline that cuts cells (`kernels.CUT`), of bodies that lie
+    still as seen from the grid; an edge of the domain is smooth and sets no point back."""
     x, y = grid.node_positions()
     window = (x[0] - grid.spacing, x[-1] + grid.spacing, y[0] - grid.spacing, y[-1] + grid.spacing)
     found = np.zeros((grid.columns, grid.rows), dtype=np.int32)
@@ -67,10 +68,13 @@ def solid_cells(bodies: Sequence[Body], grid: GridLayout) -> NDArray[np.int32]:
     corner = 0.75 * grid.spacing
     for body in bodies:
         if not body.edge:
-            distance = _distance(body.outline.segments, x, y, window, grid.spacing)
+            pieces = body.outline.segments
+            distance, nearest = _nearest(pieces, x, y, window, grid.spacing)
             found[distance < corner - 0.5 * grid.spacing] |= DEEP
             if body.rubs:
                 found[distance < corner + RUBBED * grid.spacing] |= RUBS
+            cuts = ~along_grid(pieces, grid)
+            found[(distance < BESIDE * grid.spacing) & cuts[nearest]] |= CUT
     return found
 
 
@@ -80,20 +84,23 @@ def _set_back(body: Body, depth: float) -> Segments:
     return pieces.grown(np.where(inclined, -depth, 0.0)) if depth else pieces
 
 
-def _distance(
+def _nearest(
     solid: Segments, x: NDArray[Any], y: NDArray[Any], window: tuple[float, ...], spacing: float
-) -> NDArray[np.float64]:
-    """Distance [columns, rows] of the corners from the outline; infinite outside the box of a closed one."""
+) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Distance from the outline and nearest piece [columns, rows] of the corners; infinite, and the first, outside the
+    box of a closed one."""
+    piece = np.zeros((len(x), len(y)), dtype=np.int64)
     if len(solid) == 1 and solid.normal[0, 0] == 0.0:
-        return np.broadcast_to(solid.normal[0, 1] * y - solid.offset[0], (len(x), len(y)))
+        return np.broadcast_to(solid.normal[0, 1] * y - solid.offset[0], piece.shape), piece
     reach = (RUBBED + 1.0) * spacing
     if not solid.closed:
-        return solid.nearest_on(x, y, reach)[0]
-    low = np.full((len(x), len(y)), np.inf)
+        return solid.nearest_on(x, y, reach)
+    low = np.full(piece.shape, np.inf)
     box = solid.box(*window)
     if box is None:
-        return low
+        return low, piece
     columns = (x >= box[0] - reach) & (x <= box[1] + reach)
     rows = (y >= box[2] - reach) & (y <= box[3] + reach)
-    low[np.ix_(columns, rows)] = solid.nearest_on(x[columns], y[rows], reach)[0]
-    return low
+    within = np.ix_(columns, rows)
+    low[within], piece[within] = solid.nearest_on(x[columns], y[rows], reach)
+    return low, piece
