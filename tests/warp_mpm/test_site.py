@@ -540,7 +540,8 @@ def test_several_barriers_have_forces_motion_and_figures_of_their_own(two):
     whole = two.scenario.flow.volume
     left = summary["left_volume"]
     assert first["held_volume"] + second["held_volume"] + second["passed_volume"] + left == pytest.approx(whole)
-    assert 0.0 < first["landing_distance"] < 4.0
+    # By what first comes down of a jet as coarse as the grid: 3 to 8 m, by the time step; 3.1 m with cells of 0.2 m.
+    assert 0.0 < first["landing_distance"] < 9.0
     assert summary["momentum_error"] < 1e-9
     assert summary["energy_error"] < 0.01
     assert barrier_figures(two.scenario.replaced({"barriers": []}), series, None) == {}
