@@ -197,15 +197,16 @@ def make_constitutive(
                 smooth[2] += parameters.true_liquid_density * wp.dot(parameters.gravity, x)
                 # Beside a free surface the projection is one-sided and would drain it: nothing is filtered there.
                 surrounded = wp.where(least_filling > F(0.6), wp.int32(wp.static(SURROUNDED)), wp.int32(0))
-                if BODIES and surrounded != 0:
-                    beside = wp.bool(False)
-                    if RESTING:
-                        beside = (read(grid.solid, ci * parameters.rows + cj) & wp.static(CUT)) != 0
-                    else:
-                        reach = F(wp.static(BESIDE)) * parameters.spacing
-                        beside = near_some(bodies, bodies.cuts, section(x), ci, parameters.columns, reach)
-                    if beside:
-                        surrounded = wp.int32(wp.static(BESIDE_CUT))
+                if BODIES:
+                    if surrounded != 0:
+                        beside = wp.bool(False)
+                        if RESTING:
+                            beside = (read(grid.solid, ci * parameters.rows + cj) & wp.static(CUT)) != 0
+                        else:
+                            reach = F(wp.static(BESIDE)) * parameters.spacing
+                            beside = near_some(bodies, bodies.cuts, section(x), ci, parameters.columns, reach)
+                        if beside:
+                            surrounded = wp.int32(wp.static(BESIDE_CUT))
                 write(points.surrounded, p, surrounded)
             write(points.smooth, p, smooth)
 
