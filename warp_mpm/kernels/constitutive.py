@@ -64,7 +64,7 @@ def make_constitutive(
     trace, shear_rate, sound = vectors.trace, vectors.shear_rate, vectors.sound
     SPATIAL = types.dimensions == 3
     CORNER_LAYERS = 2 if SPATIAL else 1
-    pressure_at = pore.pressure
+    pressure_at, filter_share = pore.pressure, pore.filter_share
     porosity = pore.porosity
     elementary = make_elementary(types)
     read, write, larger, smaller = elementary.read, elementary.write, elementary.larger, elementary.smaller
@@ -351,9 +351,10 @@ def make_constitutive(
             if RELAXATION:
                 # The residual r = (1 - P) p of the projection P is noise, and little else; of a smooth pressure
                 # (1 - P) r is less still, of fourth order in the spacing. One step old, r needs no further transfer.
+                # What P r gives back goes to points beside a cut as well, so that no liquid is lost.
                 share = smaller(parameters.relaxation_rate * time_step, F(1.0))
                 surrounded = read(points.surrounded, p)
-                own = wp.where(surrounded == wp.static(SURROUNDED), read(points.pressure_residual, p), F(0.0))
+                own = filter_share(surrounded) * read(points.pressure_residual, p)
                 correction = share * (own - smooth[3]) / parameters.liquid_bulk_modulus
                 write(points.pressure_residual, p, pressure_at(read(points.liquid_strain, p), parameters) - smooth[2])
                 filtered = wp.where(strain < F(0.0), smaller(strain + correction, F(0.0)), strain)

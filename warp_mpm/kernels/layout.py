@@ -61,9 +61,14 @@ FASTEST = 1.0e5
 """Speed [m/s] beyond which a run has diverged, whatever the scene."""
 
 SURROUNDED, BESIDE_CUT = 1, 2
-"""`surrounded` of a point whose corners are all filled: the filter draws its pressure toward the average; or the point
-lies beside an outline that cuts cells, and takes only what the filter takes from those around it, so that no liquid is
-lost. Of any other: 0."""
+"""`surrounded` of a point whose corners are all filled: the filter draws its pressure toward the average; beside an
+outline that cuts cells only by `BESIDE_CUT_SHARE`. Of any other: 0."""
+
+BESIDE_CUT_SHARE = 0.05
+"""Of what the filter of the pore pressure takes from a point, where cells are cut. Their points need pressures that
+differ, or they would not push on the nodes as the surface does: an average takes that away, the skeleton bears it, and
+friction grows by that. What does not push on the nodes at all goes at a twentieth of the rate as well; left alone it
+grows with the liquid's stiffness."""
 
 # Where a material point is, an entry of the points' `inside`.
 WAITING = -1

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 import warp as wp
 
 from .elementary import make_elementary
+from .layout import BESIDE_CUT, BESIDE_CUT_SHARE, SURROUNDED
 
 LEAST_POROSITY = 0.01
 """Porosity below which a crushed skeleton's voids are not followed."""
 
 
 def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
-    """Build the functions `pressure`, `porosity` and `resistance`."""
+    """Build the functions `pressure`, `porosity`, `resistance` and `filter_share`."""
     F = types.scalar
     Parameters = types.Parameters
     POROSITY = types.effects.porosity_update
@@ -46,4 +47,10 @@ def make_pore_pressure(types: SimpleNamespace) -> SimpleNamespace:
             result = F(exponential(wp.float64((parameters.porosity - n) / parameters.conductivity_scale)))
         return result
 
-    return SimpleNamespace(pressure=pressure, porosity=porosity, resistance=resistance)
+    @wp.func
+    def filter_share(surrounded: wp.int32) -> F:
+        """Share of its residual that `pressure_relaxation` takes from a point."""
+        beside = wp.where(surrounded == wp.static(BESIDE_CUT), F(wp.static(BESIDE_CUT_SHARE)), F(0.0))
+        return wp.where(surrounded == wp.static(SURROUNDED), F(1.0), beside)
+
+    return SimpleNamespace(pressure=pressure, porosity=porosity, resistance=resistance, filter_share=filter_share)

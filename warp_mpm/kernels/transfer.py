@@ -13,7 +13,6 @@ from .layout import (
     FLOW_END,
     FLOW_STEP,
     SPEED_MAX,
-    SURROUNDED,
     TIME_STEP,
 )
 
@@ -87,7 +86,7 @@ def make_transfer(
     DRAG_AT, BEYOND_AT = types.told.get("drag", 0), types.told.get("drag_beyond", 0)
     resistance = pore.resistance
     OWN_DIVERGENCE = "liquid_divergence" in types.point_fields and TWO_PHASE
-    pressure_at = pore.pressure
+    pressure_at, filter_share = pore.pressure, pore.filter_share
     porosity = pore.porosity
 
     @wp.func
@@ -411,8 +410,7 @@ def make_transfer(
             excess = F(0.0)
             residual = F(0.0)
             if RELAXATION:
-                if read(points.surrounded, p) == wp.static(SURROUNDED):
-                    residual = read(points.pressure_residual, p)
+                residual = filter_share(read(points.surrounded, p)) * read(points.pressure_residual, p)
                 # Excess over the hydrostatic part, so that water at rest is left as it is.
                 excess = pressure_at(read(points.liquid_strain, p), parameters)
                 excess -= parameters.true_liquid_density * wp.dot(parameters.gravity, x)

@@ -17,9 +17,8 @@ RUBBED = 3.0
 """Cells from a surface within which points may share a node with it."""
 
 BESIDE = 1.5
-"""Cells from an outline that cuts cells within which pore pressures are not averaged: those that it cuts and the ones
-next to them, whose corners they share. Where a cell is cut its points need pressures that differ, or they would not
-push on the nodes as the surface does; an average takes them away, and the skeleton bears what it takes."""
+"""Cells from an outline that cuts cells within which pore pressures are hardly averaged (`layout.BESIDE_CUT_SHARE`):
+those that it cuts and the ones next to them, whose corners they share."""
 
 NEAR = 5.0
 """Cells from a point's column within which it looks at the pieces of a profile: more than `RUBBED` and the cells that a
