@@ -21,7 +21,7 @@ KNOWN_SHORT = {
     "corner": ("filling of the corner", "pressure in the corner"),
     # The roller breaks again and again, so that the place of the front is uncertain by a depth: 13 % too fast.
     "bore": ("speed of the bore",),
-    # Points that have moved integrate the stress of cut cells no longer exactly: 1.6 % after 6 s at 0.125 m.
+    # Points that have moved integrate the stress of cut cells no longer exactly: 1.3 % after 6 s at 0.125 m.
     "at-rest": ("greatest speed falls with the spacing",),
     # Five cells a radius lose 0.8 % of their angular momentum in two turns at the full time step, ten cells 0.2 %.
     "rotation": ("5 cells a radius, Courant number 0.95: angular momentum",),

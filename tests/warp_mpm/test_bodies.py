@@ -124,7 +124,7 @@ def basin(formulation="dry", *, bodies=(), end_time=1.0, **options):
 
 
 @pytest.mark.parametrize("passing", [False, True])
-def test_pore_pressures_are_not_averaged_beside_an_outline_that_cuts_cells(passing):
+def test_pore_pressures_are_hardly_averaged_beside_an_outline_that_cuts_cells(passing):
     """An inclined face does, an upright one on a line of the grid does not, unless it moves over the grid."""
     wedge = Body("wedge", Outline([[-4.0, -1.0], [-4.0, 3.0], [0.0, -1.0]]))
     post = Body(

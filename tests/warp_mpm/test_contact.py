@@ -221,7 +221,7 @@ def test_the_last_of_a_flow_on_a_thin_barrier_is_not_thrown_off(load_scene):
 
 
 def test_the_distance_hardly_hangs_on_the_filter_of_the_pore_pressure(load_scene):
-    """Case 1 at 0.4 m: five times the strength, 0.6 % of the distance. Where the cells that the face cuts are averaged
+    """Case 1 at 0.4 m: five times the strength, 0.4 % of the distance. Where the cells that the face cuts are averaged
     as well it is 5 %, as the skeleton then bears what the average takes out of them, and rubs the more."""
     slid = []
     for strength in (0.2, 1.0):
